@@ -1,0 +1,64 @@
+//! The one error type. Every variant has a stable code, carries the numbers a reader needs, and a remedy.
+//!
+//! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
+//! `O` output. A code never changes its meaning; a retired code is not used again.
+
+use std::path::PathBuf;
+
+/// The result of everything in this crate that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// What went wrong, with its numbers, place and units.
+///
+/// `Display` gives the message (what, where, how much); [`Error::code`] the stable code, [`Error::help`] the
+/// edit or command that mends it, [`Error::exit_code`] what the process returns.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    // ---- C: problem file ------------------------------------------------------------------------------
+    // ---- M: recording ---------------------------------------------------------------------------------
+    // ---- K: markers against the model -----------------------------------------------------------------
+    // ---- G: geometry ----------------------------------------------------------------------------------
+    // ---- S: solver ------------------------------------------------------------------------------------
+    /// The factorisation met a pivot that is not a finite number.
+    #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
+    NotFinite,
+    // ---- F: fit ---------------------------------------------------------------------------------------
+    // ---- O: output ------------------------------------------------------------------------------------
+    /// A file could not be read or written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// The verb: `read`, `write`, `create`, `rename`.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    /// The stable code, for example `S003`.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Error::NotFinite => "S001",
+            Error::Io { .. } => "O001",
+        }
+    }
+
+    /// The edit or command that mends it, where one is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Error::NotFinite => None,
+            Error::Io { .. } => Some("check that the path exists and that you may use it".into()),
+        }
+    }
+
+    /// The exit code of the process: 3 invalid input, 4 not converged, 6 input or output failed.
+    pub fn exit_code(&self) -> u8 {
+        match self.code().as_bytes()[0] {
+            b'S' | b'F' => 4,
+            b'O' => 6,
+            _ => 3,
+        }
+    }
+}

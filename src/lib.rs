@@ -1,0 +1,7 @@
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+//! risorius finds out which muscles moved a face.
+
+pub mod error;
+
+pub use error::{Error, Result};
