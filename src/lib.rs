@@ -3,5 +3,9 @@
 //! risorius finds out which muscles moved a face.
 
 pub mod error;
+pub mod material;
+pub mod math;
+pub mod mesh;
+pub mod term;
 
 pub use error::{Error, Result};

@@ -1,0 +1,56 @@
+//! Fibre directions from Euler angles that are given at nodes and interpolated trilinearly (Wu et al. 2013, section 3.3).
+
+use super::element::{Element, Trilinear};
+use super::{Mesh, position_and_jacobian};
+use crate::math::tensor::{Matrix, Vector, cross, normalised};
+
+/// Euler angles (A, B, G) in radians at the nodes of a mesh: fibre angle, imbrication, sheet.
+#[derive(Debug, Clone)]
+pub struct FibreAngles {
+    /// One triple per node.
+    pub nodes: Vec<[f64; 3]>,
+}
+
+impl FibreAngles {
+    /// The same angles everywhere.
+    pub fn uniform(mesh: &Mesh, angles: [f64; 3]) -> FibreAngles {
+        FibreAngles { nodes: vec![angles; mesh.nodes] }
+    }
+
+    /// The angles at a point of an element.
+    pub fn at(&self, mesh: &Mesh, element: usize, xi: [f64; 3]) -> [f64; 3] {
+        let values = Trilinear.values(xi);
+        let mut angles = [0.0; 3];
+        for (corner, node) in mesh.corners[element].iter().enumerate() {
+            for (sum, angle) in angles.iter_mut().zip(self.nodes[*node]) {
+                *sum += values[corner] * angle;
+            }
+        }
+        angles
+    }
+
+    /// The unit fibre direction at a point of an element with local reference parameters `local`.
+    pub fn direction(&self, mesh: &Mesh, element: usize, local: &[[f64; 64]; 3], xi: [f64; 3]) -> Vector {
+        let (_, jacobian) = position_and_jacobian(mesh.element, local, xi);
+        axes(&jacobian, self.at(mesh, element, xi))[0]
+    }
+}
+
+/// The material axes (fibre, sheet, normal) from dX/dxi and the angles (A, B, G).
+///
+/// f1 = dX/dxi1 normalised, f3 = (dX/dxi1 x dX/dxi2) normalised, f2 = f3 x f1;
+/// a = cos A f1 + sin A f2, b = -sin A f1 + cos A f2;
+/// a' = cos B a - sin B f3, c = cos B f3 + sin B a;  b' = cos G b + sin G c, c' = cos G c - sin G b.
+/// Positive B tips the fibre a' towards -f3.
+pub fn axes(jacobian: &Matrix, [angle, imbrication, sheet]: [f64; 3]) -> [Vector; 3] {
+    let column = |d: usize| [jacobian[0][d], jacobian[1][d], jacobian[2][d]];
+    let f1 = normalised(column(0));
+    let f3 = normalised(cross(column(0), column(1)));
+    let f2 = cross(f3, f1);
+    let combine = |s: f64, u: Vector, t: f64, v: Vector| std::array::from_fn(|i| s * u[i] + t * v[i]);
+    let a = combine(angle.cos(), f1, angle.sin(), f2);
+    let b = combine(-angle.sin(), f1, angle.cos(), f2);
+    let fibre = combine(imbrication.cos(), a, -imbrication.sin(), f3);
+    let c = combine(imbrication.cos(), f3, imbrication.sin(), a);
+    [fibre, combine(sheet.cos(), b, sheet.sin(), c), combine(sheet.cos(), c, -sheet.sin(), b)]
+}

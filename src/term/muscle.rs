@@ -1,0 +1,261 @@
+//! An embedded muscle: fibres at the quadrature points of the muscle's own mesh, acting on the host that holds them
+//! (Wu et al. 2013, Eqs. 7 to 11).
+//!
+//! Pi = sum over points w sigma_max (a G_act(s) + G_pas(s)),  s = |F n0| / lambda_ofl
+//!
+//! A fibre acts along one direction. With g_a = dN_a/dX . n0 computed once, v = F n0 = sum x_a g_a, lambda = |v|,
+//! n = v / lambda, T = dW/dlambda:
+//!   dPi/du_a     = sum w T n g_a
+//!   d2Pi/du du   = sum w D g_a g_b,   D = T' n (x) n + T/lambda (I - n (x) n)
+//!   d2Pi/du da   = sum w (dT/da) n g_a
+
+use super::{Contribution, ElementState, ElementSystem, Term, Want};
+use crate::material::PAIRS;
+use crate::material::fibre::Blemker;
+use crate::math::quadrature::GaussRule;
+use crate::math::tensor::{Vector, apply_transposed, determinant, dot, inverse, norm};
+use crate::mesh::fibre_angles::FibreAngles;
+use crate::mesh::location::{Locator, Outside};
+use crate::mesh::{MaterialPoint, Mesh, position_and_jacobian};
+use pulp::{Arch, Simd, WithSimd};
+
+/// A muscle embedded in a host mesh.
+pub struct Muscle {
+    name: String,
+    law: Blemker,
+    /// The control that is its activation.
+    control: [usize; 1],
+    /// All points, sorted by host element.
+    points: Vec<Point>,
+    /// `starts[e]..starts[e + 1]` are the points in host element e.
+    starts: Vec<usize>,
+    arch: Arch,
+}
+
+/// A quadrature point of a muscle.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// Where it lies in the host.
+    pub host: MaterialPoint,
+    /// Which Gauss point of the muscle it is: element by element, first direction fastest.
+    pub index: usize,
+    /// Reference position, mm.
+    pub position: Vector,
+    /// Gauss weight x det(dX/deta), mm3.
+    pub weight: f64,
+    /// Unit fibre direction in the reference state.
+    pub fibre: Vector,
+    /// g_a = dN_a/dX . n0, 1/mm.
+    gradient: [f64; 64],
+}
+
+/// Points of a muscle that the host does not hold, or that lie in an inverted element.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NotEmbedded {
+    /// Some quadrature points lie outside the host.
+    Outside {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        of: usize,
+        /// The muscle element of the farthest one.
+        element: usize,
+        /// Position of the farthest one, mm.
+        position: Vector,
+        /// Its distance to the host, mm.
+        distance: f64,
+    },
+    /// det(dX/deta) of the muscle's own mesh is not positive at a point.
+    Inverted {
+        /// The muscle element.
+        element: usize,
+        /// det(dX/deta), mm3.
+        det: f64,
+    },
+}
+
+impl Muscle {
+    /// Embeds `mesh` with its fibre angles in `host`; `gauss` points per direction in each of its elements. `control` is
+    /// the index of its activation.
+    pub fn new(
+        name: &str,
+        host: &Mesh,
+        locator: &Locator<'_>,
+        mesh: &Mesh,
+        angles: &FibreAngles,
+        gauss: usize,
+        law: Blemker,
+        control: usize,
+    ) -> Result<Muscle, NotEmbedded> {
+        let rule = GaussRule::new(gauss);
+        let per_element = rule.len().pow(3);
+        let mut points = Vec::with_capacity(mesh.elements() * per_element);
+        let mut farthest: Option<(usize, Vector, Outside)> = None;
+        let mut outside = 0;
+        for element in 0..mesh.elements() {
+            let local = mesh.local(element);
+            for (q, (eta, weight)) in rule.cube().enumerate() {
+                let (position, jacobian) = position_and_jacobian(mesh.element, &local, eta);
+                let det = determinant(&jacobian);
+                if det.is_nan() || det <= 0.0 {
+                    return Err(NotEmbedded::Inverted { element, det });
+                }
+                let fibre = angles.direction(mesh, element, &local, eta);
+                match locator.locate(position) {
+                    Ok(at) => points.push(Point {
+                        host: at,
+                        index: element * per_element + q,
+                        position,
+                        weight: weight * det,
+                        fibre,
+                        gradient: directional_gradient(host, at, fibre),
+                    }),
+                    Err(found) => {
+                        outside += 1;
+                        if farthest.is_none_or(|(_, _, f)| found.distance > f.distance) {
+                            farthest = Some((element, position, found));
+                        }
+                    }
+                }
+            }
+        }
+        if let Some((element, position, Outside { distance, .. })) = farthest {
+            let of = mesh.elements() * per_element;
+            return Err(NotEmbedded::Outside { count: outside, of, element, position, distance });
+        }
+        points.sort_by_key(|p| (p.host.element, p.index));
+        let mut starts = vec![0; host.elements() + 1];
+        for p in &points {
+            starts[p.host.element + 1] += 1;
+        }
+        for e in 0..host.elements() {
+            starts[e + 1] += starts[e];
+        }
+        Ok(Muscle { name: name.to_owned(), law, control: [control], points, starts, arch: Arch::new() })
+    }
+
+    /// The index of its activation among the controls.
+    pub fn control(&self) -> usize {
+        self.control[0]
+    }
+
+    /// Its points, sorted by host element.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Its reference volume, mm3.
+    pub fn volume(&self) -> f64 {
+        self.points.iter().map(|p| p.weight).sum()
+    }
+
+    /// The constants of its law.
+    pub fn law(&self) -> &Blemker {
+        &self.law
+    }
+
+    fn points_in(&self, element: usize) -> &[Point] {
+        &self.points[self.starts[element]..self.starts[element + 1]]
+    }
+}
+
+impl Point {
+    /// v = F n0 from the local parameters of x in the point's host element; |v| is the stretch.
+    #[inline(always)]
+    pub fn deformed_fibre(&self, x: &[[f64; 64]; 3]) -> Vector {
+        std::array::from_fn(|i| (0..64).map(|a| x[i][a] * self.gradient[a]).sum())
+    }
+}
+
+/// g_a = dN_a/dX . n0 = dN_a/dxi . (dxi/dX n0).
+fn directional_gradient(host: &Mesh, at: MaterialPoint, fibre: Vector) -> [f64; 64] {
+    let jacobian = host.jacobian(at);
+    let inverse = inverse(&jacobian, determinant(&jacobian));
+    let along: Vector = std::array::from_fn(|d| dot(inverse[d], fibre));
+    let gradients = host.element.gradients(at.xi);
+    debug_assert!((norm(apply_transposed(&inverse, [1.0; 3]))).is_finite());
+    std::array::from_fn(|a| dot(gradients[a], along))
+}
+
+impl Term for Muscle {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn acts_on(&self, element: usize) -> bool {
+        self.starts[element] < self.starts[element + 1]
+    }
+
+    fn points(&self, element: usize) -> usize {
+        self.starts[element + 1] - self.starts[element]
+    }
+
+    fn controls(&self) -> &[usize] {
+        &self.control
+    }
+
+    fn add(&self, state: &ElementState<'_>, want: Want, system: &mut ElementSystem) -> Contribution {
+        let mut energy = 0.0;
+        for point in self.points_in(state.element) {
+            let v = point.deformed_fibre(state.x);
+            let lambda = norm(v);
+            let n = v.map(|c| c / lambda);
+            let tension = self.law.tension(lambda, state.controls[self.control[0]]);
+            energy += point.weight * tension.energy;
+            for i in 0..3 {
+                let force = point.weight * tension.force * n[i];
+                for (target, g) in system.force[i].iter_mut().zip(&point.gradient) {
+                    *target += force * g;
+                }
+            }
+            if want == Want::Stiffness {
+                let across = tension.force / lambda;
+                let blocks = PAIRS.map(|(i, k)| {
+                    let d = (tension.slope - across) * n[i] * n[k] + if i == k { across } else { 0.0 };
+                    point.weight * d
+                });
+                self.arch.dispatch(RankOne { blocks, gradient: &point.gradient, stiffness: &mut system.stiffness });
+            }
+        }
+        Contribution { energy, det_f: None }
+    }
+
+    fn add_control_force(&self, control: usize, state: &ElementState<'_>, force: &mut [[f64; 64]; 3]) {
+        if control != self.control[0] {
+            return;
+        }
+        for point in self.points_in(state.element) {
+            let v = point.deformed_fibre(state.x);
+            let lambda = norm(v);
+            let per_activation = self.law.tension_per_activation(lambda).force * point.weight / lambda;
+            for i in 0..3 {
+                for (target, g) in force[i].iter_mut().zip(&point.gradient) {
+                    *target += per_activation * v[i] * g;
+                }
+            }
+        }
+    }
+}
+
+/// stiffness[pair] += blocks[pair] g g^T, compiled once per instruction set.
+struct RankOne<'a> {
+    blocks: [f64; 6],
+    gradient: &'a [f64; 64],
+    stiffness: &'a mut [[f64; 4096]],
+}
+
+impl WithSimd for RankOne<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (block, scale) in self.stiffness.iter_mut().zip(self.blocks) {
+            for (row, g) in block.chunks_exact_mut(64).zip(self.gradient) {
+                let factor = scale * g;
+                for (target, g) in row.iter_mut().zip(self.gradient) {
+                    *target += factor * g;
+                }
+            }
+        }
+    }
+}
