@@ -22,6 +22,23 @@ pub enum Error {
     /// The factorisation met a pivot that is not a finite number.
     #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
     NotFinite,
+    /// The factorisation met a pivot that is exactly zero, or whose inverse overflows.
+    #[error("the tangent matrix is singular: no pivot is left for unknown {unknown}")]
+    Singular {
+        /// Number of the unknown, counted from 0 after the supports have been removed.
+        unknown: usize,
+    },
+    /// The factor of the tangent matrix does not fit into memory.
+    #[error("no memory for the factor of the tangent matrix: {unknowns} unknowns, {entries} entries of 8 bytes")]
+    FactorTooLarge {
+        /// Number of unknowns.
+        unknowns: usize,
+        /// Entries of the triangular factor.
+        entries: usize,
+    },
+    /// A solve was asked of a factor that was never filled, or whose last factorisation failed.
+    #[error("the tangent matrix has not been factorised")]
+    NotFactored,
     // ---- F: fit ---------------------------------------------------------------------------------------
     // ---- O: output ------------------------------------------------------------------------------------
     /// A file could not be read or written.
@@ -41,6 +58,9 @@ impl Error {
     pub fn code(&self) -> &'static str {
         match self {
             Error::NotFinite => "S001",
+            Error::Singular { .. } => "S010",
+            Error::FactorTooLarge { .. } => "S011",
+            Error::NotFactored => "S012",
             Error::Io { .. } => "O001",
         }
     }
@@ -49,6 +69,11 @@ impl Error {
     pub fn help(&self) -> Option<String> {
         match self {
             Error::NotFinite => None,
+            Error::Singular { .. } => {
+                Some("hold the body: check that the supports prevent every rigid motion".into())
+            }
+            Error::FactorTooLarge { .. } => Some("use a coarser mesh or a machine with more memory".into()),
+            Error::NotFactored => None,
             Error::Io { .. } => Some("check that the path exists and that you may use it".into()),
         }
     }
