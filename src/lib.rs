@@ -3,9 +3,12 @@
 //! risorius finds out which muscles moved a face.
 
 pub mod error;
+pub mod forward;
 pub mod material;
 pub mod math;
 pub mod mesh;
+pub mod model;
+pub mod solve;
 pub mod term;
 
 pub use error::{Error, Result};

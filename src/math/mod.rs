@@ -1,5 +1,12 @@
 //! Nothing of mechanics: small tensors, vector lanes, quadrature, sparse matrices and their factorisation.
+//!
+//! The linear systems of a mixed displacement-pressure body are symmetric, indefinite and blocked: the unknowns come in
+//! small contiguous *groups* (one a mesh node, or one an element), and every element couples all of its groups.
 
+pub mod factor;
 pub mod lanes;
+pub mod ordering;
 pub mod quadrature;
+mod refine;
+pub mod sparse;
 pub mod tensor;

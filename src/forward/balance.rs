@@ -1,0 +1,231 @@
+//! The balance r(u, p; a) = 0 of a model as Newton's method sees it.
+
+use super::{Drive, Work, seconds_since};
+use crate::error::{Error, Result};
+use crate::math::factor::Factor;
+use crate::math::sparse::SymmetricMatrix;
+use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
+use crate::solve::newton::{Assessment, Equations};
+use crate::term::Want;
+use std::time::Instant;
+
+/// A residual below this part of mu V^(2/3) is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Relative residual of a Newton step.
+const STEP_TOLERANCE: f64 = 1e-10;
+/// Relative residual that a solve with the tangent of an equilibrium must reach, and what it strives for.
+const TANGENT_REQUIRED: f64 = 1e-9;
+const TANGENT_TOLERANCE: f64 = 1e-13;
+/// Sweeps after which a stale factor is not worth keeping.
+const STALE_SWEEPS: usize = 12;
+
+/// A model with the memory to solve it.
+pub(super) struct Balance<'m> {
+    pub model: &'m Model,
+    tolerance: f64,
+    workspace: Workspace,
+    matrix: SymmetricMatrix,
+    factor: Factor,
+    factored: bool,
+    target: Drive,
+    /// Prescribed displacements at the target: (parameter, component, mm).
+    prescribed: Vec<(usize, usize, f64)>,
+    /// The last evaluation, and what of the prescribed motion was outstanding then.
+    evaluation: Option<Evaluation>,
+    gap: Option<Vec<[f64; 3]>>,
+    worst: WorstPoint,
+    work: Work,
+}
+
+/// A Newton step: free unknowns, and the prescribed motion that comes with it.
+pub(super) struct Direction {
+    unknowns: Vec<f64>,
+    gap: Option<Vec<[f64; 3]>>,
+}
+
+impl<'m> Balance<'m> {
+    pub fn new(model: &'m Model, tolerance: f64) -> Result<Balance<'m>> {
+        let terms = model.terms().len();
+        Ok(Balance {
+            model,
+            tolerance,
+            workspace: Workspace::default(),
+            matrix: model.matrix(),
+            factor: Factor::new(model.symbolic().clone())?,
+            factored: false,
+            target: Drive { controls: vec![0.0; model.controls().len()], load: 0.0 },
+            prescribed: Vec::new(),
+            evaluation: None,
+            gap: None,
+            worst: WorstPoint { min: 1.0, element: 0, point: 0, max: 1.0 },
+            work: Work { points: vec![0; terms], term_seconds: vec![0.0; terms], ..Work::default() },
+        })
+    }
+
+    pub fn set_target(&mut self, target: Drive) {
+        self.prescribed = self.model.supports().prescribed(self.model.mesh(), target.load);
+        self.target = target;
+    }
+
+    /// A state with the controls and the load of the target; prescribed motion may still be outstanding.
+    pub fn at_target(&self, state: State) -> State {
+        State { controls: self.target.controls.clone(), load: self.target.load, ..state }
+    }
+
+    pub fn work(&self) -> Work {
+        Work { linear: self.factor.work(), ..self.work.clone() }
+    }
+
+    pub fn count_cut(&mut self) {
+        self.work.cuts += 1;
+    }
+
+    pub fn worst_point(&self) -> WorstPoint {
+        self.worst
+    }
+
+    /// now + ratio (now - before) for all unknowns.
+    pub fn extrapolate(&self, before: &State, now: &State, ratio: f64) -> State {
+        let along = |a: f64, b: f64| b + ratio * (b - a);
+        State {
+            u: before.u.iter().zip(&now.u).map(|(a, b)| std::array::from_fn(|i| along(a[i], b[i]))).collect(),
+            p: before.p.iter().zip(&now.p).map(|(a, b)| along(*a, *b)).collect(),
+            ..now.clone()
+        }
+    }
+
+    pub fn evaluation_at(&mut self, state: &State) -> Evaluation {
+        self.evaluate(state, Want::Force, None)
+    }
+
+    /// Negative eigenvalues beyond one per pressure at the last factorisation.
+    pub fn negative_modes(&self) -> Option<usize> {
+        let pressures = self.model.numbering().pressures();
+        self.factored.then(|| self.factor.inertia().negative.saturating_sub(pressures))
+    }
+
+    pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
+        self.evaluate(state, Want::Stiffness, None);
+        self.assemble();
+        let original = rhs.to_vec();
+        if self.factored {
+            let quality = self.factor.solve(&self.matrix, rhs, columns, TANGENT_TOLERANCE)?;
+            if quality.residual <= TANGENT_REQUIRED && quality.sweeps <= STALE_SWEEPS {
+                return Ok(());
+            }
+            rhs.copy_from_slice(&original);
+        }
+        self.factor.refactor(&self.matrix)?;
+        self.factored = true;
+        let quality = self.factor.solve(&self.matrix, rhs, columns, TANGENT_TOLERANCE)?;
+        if quality.residual <= TANGENT_REQUIRED {
+            Ok(())
+        } else {
+            Err(Error::InaccurateSolve { residual: quality.residual, required: TANGENT_REQUIRED })
+        }
+    }
+
+    fn evaluate(&mut self, state: &State, want: Want, gap: Option<&[[f64; 3]]>) -> Evaluation {
+        let start = Instant::now();
+        let evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
+        self.work.assembly_seconds += seconds_since(start);
+        match want {
+            Want::Force => self.work.force_evaluations += 1,
+            Want::Stiffness => self.work.assemblies += 1,
+        }
+        for (total, seconds) in self.work.term_seconds.iter_mut().zip(&evaluation.seconds) {
+            *total += seconds;
+        }
+        for (total, count) in self.work.points.iter_mut().zip(self.model.points()) {
+            *total += count;
+        }
+        evaluation
+    }
+
+    fn assemble(&mut self) {
+        let start = Instant::now();
+        self.model.assemble(&self.workspace, &mut self.matrix);
+        self.work.assembly_seconds += seconds_since(start);
+    }
+
+    /// Prescribed motion that a state still lacks, per parameter; `None` when nothing is outstanding.
+    fn outstanding(&self, state: &State) -> Option<Vec<[f64; 3]>> {
+        let missing = |&(parameter, component, value): &(usize, usize, f64)| value - state.u[parameter][component];
+        let scale = 1e-14 * self.model.element_size();
+        if self.prescribed.iter().all(|p| missing(p).abs() <= scale) {
+            return None;
+        }
+        let mut gap = vec![[0.0; 3]; state.u.len()];
+        for p in &self.prescribed {
+            gap[p.0][p.1] = missing(p);
+        }
+        Some(gap)
+    }
+
+    /// sqrt(|r_u|^2 + (mu/h)^2 |r_p|^2), mN.
+    fn norm(&self, residual: &[f64]) -> f64 {
+        let weight = self.model.volume_scale();
+        let mut sum: f64 = residual.iter().map(|r| r * r).sum();
+        for index in 0..self.model.numbering().pressures() {
+            let r = residual[self.model.numbering().pressure_unknown(index)];
+            sum += (weight * weight - 1.0) * r * r;
+        }
+        sum.max(0.0).sqrt()
+    }
+}
+
+impl Equations for Balance<'_> {
+    type State = State;
+    type Step = Direction;
+
+    fn assess(&mut self, state: &State, linearise: bool) -> Assessment {
+        debug_assert!(state.controls == self.target.controls && state.load == self.target.load);
+        let gap = self.outstanding(state);
+        let want = if linearise { Want::Stiffness } else { Want::Force };
+        let evaluation = self.evaluate(state, want, gap.as_deref());
+        if linearise {
+            self.assemble();
+        }
+        self.worst = evaluation.det_f;
+        let residual = self.norm(&evaluation.residual);
+        let assessment = Assessment {
+            residual,
+            required: self.tolerance * evaluation.magnitude + ROUNDING * self.model.force_scale(),
+            admissible: evaluation.det_f.min > 0.0 && residual.is_finite(),
+            outstanding: gap.is_some(),
+        };
+        self.evaluation = Some(evaluation);
+        self.gap = gap;
+        assessment
+    }
+
+    fn step(&mut self) -> Result<Direction> {
+        let Some(evaluation) = &self.evaluation else { return Err(Error::NotFactored) };
+        let mut unknowns: Vec<f64> =
+            evaluation.residual.iter().zip(&evaluation.lifted).map(|(r, k)| -(r + k)).collect();
+        self.factored = false;
+        self.factor.refactor(&self.matrix)?;
+        self.factored = true;
+        self.work.iterations += 1;
+        self.factor.solve(&self.matrix, &mut unknowns, 1, STEP_TOLERANCE)?;
+        Ok(Direction { unknowns, gap: self.gap.take() })
+    }
+
+    fn advance(&self, state: &State, step: &Direction, factor: f64) -> State {
+        let mut next = state.clone();
+        self.model.advance(&mut next, &step.unknowns, factor);
+        if step.gap.is_some() {
+            if factor == 1.0 {
+                // exactly, so that nothing is left outstanding by rounding
+                for &(parameter, component, value) in &self.prescribed {
+                    next.u[parameter][component] = value;
+                }
+            } else if let Some(gap) = &step.gap {
+                for &(parameter, component, _) in &self.prescribed {
+                    next.u[parameter][component] += factor * gap[parameter][component];
+                }
+            }
+        }
+        next
+    }
+}

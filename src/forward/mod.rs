@@ -1,0 +1,262 @@
+//! Equilibrium: from one state to another along a path of controls, loads and prescribed motion.
+
+mod balance;
+
+use crate::error::{Error, Result};
+use crate::math::factor;
+use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
+use crate::solve::newton::{Iteration, Limits, Outcome, Stop, newton};
+use crate::solve::path::{StepLimits, Stepper};
+use crate::term::Want;
+use balance::Balance;
+use std::time::Instant;
+
+/// What drives a model to an equilibrium.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drive {
+    /// Controls in the order of the model.
+    pub controls: Vec<f64>,
+    /// Factor on dead loads and prescribed motions, 1 for what the scene says.
+    pub load: f64,
+}
+
+/// How equilibria are sought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Residual in relation to the element forces.
+    pub tolerance: f64,
+    /// Newton iterations for each step of the path.
+    pub max_iterations: usize,
+    /// Longest step of the path, as a part of the whole.
+    pub step_max: f64,
+    /// Shortest step.
+    pub step_min: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+    }
+}
+
+/// One converged step of a path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Where on the path, 0 to 1.
+    pub place: f64,
+    /// Newton iterations of the step.
+    pub iterations: Vec<Iteration>,
+    /// Residual at the end, mN.
+    pub residual: f64,
+    /// The residual required, mN.
+    pub required: f64,
+}
+
+/// Work done, in counts and seconds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Work {
+    /// Newton iterations, failed steps included.
+    pub iterations: usize,
+    /// Evaluations of energy and force in all elements.
+    pub force_evaluations: usize,
+    /// Evaluations with stiffness, each followed by an assembly.
+    pub assemblies: usize,
+    /// Steps of paths that failed and were cut.
+    pub cuts: usize,
+    /// Quadrature points evaluated, one count per term.
+    pub points: Vec<usize>,
+    /// Time in each term, summed over threads, s.
+    pub term_seconds: Vec<f64>,
+    /// Wall time of evaluations and assemblies, s.
+    pub assembly_seconds: f64,
+    /// Factorisations and solves.
+    pub linear: factor::Work,
+}
+
+impl Work {
+    /// Adds what was done elsewhere.
+    pub fn add(&mut self, other: &Work) {
+        self.iterations += other.iterations;
+        self.force_evaluations += other.force_evaluations;
+        self.assemblies += other.assemblies;
+        self.cuts += other.cuts;
+        self.points.resize(self.points.len().max(other.points.len()), 0);
+        self.points.iter_mut().zip(&other.points).for_each(|(a, b)| *a += b);
+        self.term_seconds.resize(self.term_seconds.len().max(other.term_seconds.len()), 0.0);
+        self.term_seconds.iter_mut().zip(&other.term_seconds).for_each(|(a, b)| *a += b);
+        self.assembly_seconds += other.assembly_seconds;
+        self.linear += other.linear;
+    }
+}
+
+/// A converged state, how it was reached, and what is known about it.
+#[derive(Debug, Clone)]
+pub struct Equilibrium {
+    /// The state.
+    pub state: State,
+    /// Energies, forces with reactions, range of det F.
+    pub evaluation: Evaluation,
+    /// Steps of the path to it.
+    pub history: Vec<Step>,
+    /// Negative eigenvalues of the tangent beyond one per pressure, at the last factorisation: more than none means a
+    /// saddle. `None` where nothing had to be factorised.
+    pub negative_modes: Option<usize>,
+}
+
+/// No equilibrium: why, and the last one that was found.
+#[derive(Debug)]
+pub struct Failure {
+    /// What went wrong, with its numbers.
+    pub error: Error,
+    /// The last equilibrium on the path.
+    pub last_good: State,
+    /// The part of the path at which it lies.
+    pub reached: f64,
+    /// The iterate at which Newton's method gave up.
+    pub failed: State,
+}
+
+impl From<Box<Failure>> for Error {
+    fn from(failure: Box<Failure>) -> Error {
+        failure.error
+    }
+}
+
+/// Finds equilibria of one model. Holds the memory for it: the tangent, its factor, the element systems.
+pub struct Solver<'m> {
+    balance: Balance<'m>,
+    settings: Settings,
+}
+
+impl<'m> Solver<'m> {
+    /// # Errors
+    /// Where the factor does not fit into memory.
+    pub fn new(model: &'m Model, settings: Settings) -> Result<Solver<'m>> {
+        Ok(Solver { balance: Balance::new(model, settings.tolerance)?, settings })
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'m Model {
+        self.balance.model
+    }
+
+    /// Work done since the solver was made.
+    pub fn work(&self) -> Work {
+        self.balance.work()
+    }
+
+    /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`.
+    ///
+    /// # Errors
+    /// [`Failure`] with the last equilibrium that was found on the path.
+    pub fn equilibrium(&mut self, from: &State, to: &Drive) -> std::result::Result<Equilibrium, Box<Failure>> {
+        let start = Drive { controls: from.controls.clone(), load: from.load };
+        let mut stepper = Stepper::new(StepLimits { max: self.settings.step_max, min: self.settings.step_min });
+        let mut history: Vec<Step> = Vec::new();
+        let mut last = from.clone();
+        let mut before: Option<(f64, State)> = None;
+        let limits = Limits { iterations: self.settings.max_iterations, halvings: 12 };
+        while let Some(place) = stepper.next() {
+            self.balance.set_target(between(&start, to, place));
+            let guess = match &before {
+                Some((earlier, state)) => self.balance.extrapolate(
+                    state,
+                    &last,
+                    (place - stepper.reached()) / (stepper.reached() - earlier),
+                ),
+                None => last.clone(),
+            };
+            let outcome = match self.attempt(guess, &last, limits) {
+                Ok(outcome) => outcome,
+                Err(error) => {
+                    let reached = stepper.reached();
+                    return Err(Box::new(Failure { error, last_good: last.clone(), reached, failed: last }));
+                }
+            };
+            match outcome.stop {
+                None => {
+                    stepper.succeeded(place, outcome.iterations.len());
+                    let earlier = history.last().map_or(0.0, |step| step.place);
+                    history.push(Step {
+                        place,
+                        residual: outcome.last.residual,
+                        required: outcome.last.required,
+                        iterations: outcome.iterations,
+                    });
+                    before = Some((earlier, std::mem::replace(&mut last, outcome.state)));
+                }
+                Some(stop) => {
+                    self.balance.count_cut();
+                    if !stepper.failed() {
+                        let error = self.not_converged(&stepper, stop, &outcome);
+                        let reached = stepper.reached();
+                        return Err(Box::new(Failure { error, last_good: last, reached, failed: outcome.state }));
+                    }
+                }
+            }
+        }
+        let evaluation = self.balance.evaluation_at(&last);
+        let negative_modes = self.balance.negative_modes();
+        Ok(Equilibrium { state: last, evaluation, history, negative_modes })
+    }
+
+    /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
+    fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
+        let guess = self.balance.at_target(guess);
+        let outcome = newton(&mut self.balance, guess, limits)?;
+        if outcome.stop == Some(Stop::Inadmissible) {
+            let last = self.balance.at_target(last.clone());
+            return newton(&mut self.balance, last, limits);
+        }
+        Ok(outcome)
+    }
+
+    fn not_converged(&self, stepper: &Stepper, stop: Stop, outcome: &Outcome<State>) -> Error {
+        let reason = match stop {
+            Stop::Inadmissible => "no admissible state to start from",
+            Stop::NoDescent => "no step keeps det F positive and lowers the residual",
+            Stop::Iterations => "the iterations were used up",
+            Stop::Crawling => "only very short steps were possible",
+        };
+        let WorstPoint { min, element, point, .. } = self.balance.worst_point();
+        Error::NotConverged {
+            reached: stepper.reached(),
+            cuts: stepper.cuts(),
+            step: stepper.length(),
+            reason,
+            element,
+            point,
+            det_f: min,
+            residual: outcome.last.residual,
+            required: outcome.last.required,
+        }
+    }
+
+    /// Solves K x = b with the tangent at the equilibrium `state` for several right-hand sides, one after the other in
+    /// `rhs`. The factor of Newton's last iteration is reused and the solution refined against the tangent at `state`.
+    ///
+    /// # Errors
+    /// Where the tangent cannot be factorised, or the refined solution does not reach 1e-9.
+    pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
+        self.balance.solve_with_tangent(state, rhs, columns)
+    }
+}
+
+/// The drive at a place on the straight path.
+fn between(from: &Drive, to: &Drive, place: f64) -> Drive {
+    let mix = |a: f64, b: f64| if place == 1.0 { b } else { a + place * (b - a) };
+    Drive {
+        controls: from.controls.iter().zip(&to.controls).map(|(a, b)| mix(*a, *b)).collect(),
+        load: mix(from.load, to.load),
+    }
+}
+
+/// Evaluates a model once, with a workspace of its own.
+pub fn evaluate(model: &Model, state: &State) -> Evaluation {
+    model.evaluate(state, Want::Force, None, &mut Workspace::default())
+}
+
+/// Seconds since an instant.
+fn seconds_since(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64()
+}

@@ -1,0 +1,280 @@
+//! mesh + terms + supports -> energy, residual, tangent, control forces. Immutable, shared by all solves and threads.
+
+mod assembly;
+mod numbering;
+mod state;
+pub mod supports;
+
+pub use assembly::{Evaluation, Workspace, WorstPoint};
+pub use numbering::Numbering;
+pub use state::State;
+
+use crate::error::Result;
+use crate::math::factor::Symbolic;
+use crate::math::ordering::Ordering;
+use crate::math::sparse::{BlockPattern, SymmetricMatrix};
+use crate::mesh::Mesh;
+use crate::term::pressure::PressureSpace;
+use crate::term::{ElementState, Term, Want};
+use assembly::{Parts, Plan};
+use std::sync::Arc;
+use supports::Supports;
+
+/// A quantity that drives the model from outside: an activation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Control {
+    /// Its name in problem files and tables.
+    pub name: String,
+    /// Smallest admissible value.
+    pub lower: f64,
+    /// Largest admissible value.
+    pub upper: f64,
+}
+
+/// What a model is made of.
+pub struct Ingredients {
+    /// The host.
+    pub mesh: Mesh,
+    /// The pressure space of the tissue.
+    pub space: &'static dyn PressureSpace,
+    /// All effects; the tissue first.
+    pub terms: Vec<Box<dyn Term>>,
+    /// Prescribed motion.
+    pub supports: Supports,
+    /// Inputs of the terms, in the order of their control indices.
+    pub controls: Vec<Control>,
+    /// Shear modulus of the tissue, kPa: with the volume it sets the scale of forces.
+    pub shear_modulus: f64,
+    /// Reference volume of the tissue, mm3.
+    pub volume: f64,
+}
+
+/// A computable scene.
+pub struct Model {
+    ingredients: Ingredients,
+    numbering: Numbering,
+    pattern: Arc<BlockPattern>,
+    symbolic: Arc<Symbolic>,
+    plan: Plan,
+    /// Work that building took.
+    ordering_flops: f64,
+}
+
+impl Model {
+    /// Numbers the unknowns, finds the pattern and the elimination order.
+    ///
+    /// # Errors
+    /// Where the factor would not fit into memory.
+    pub fn new(ingredients: Ingredients) -> Result<Model> {
+        let Ingredients { mesh, space, terms, supports, .. } = &ingredients;
+        let numbering = Numbering::new(mesh, *space, supports);
+        let pattern =
+            Arc::new(BlockPattern::new(&numbering.group_start, numbering.cliques.iter().map(Vec::as_slice)));
+        let ordering = Ordering::new(&pattern, &numbering.pressure_groups());
+        let symbolic = Symbolic::new(pattern.clone(), &ordering)?;
+        let plan = Plan::new(mesh, *space, terms, &numbering, &pattern);
+        Ok(Model { numbering, pattern, symbolic, plan, ordering_flops: ordering.flops, ingredients })
+    }
+
+    /// The host.
+    pub fn mesh(&self) -> &Mesh {
+        &self.ingredients.mesh
+    }
+
+    /// All effects, the tissue first.
+    pub fn terms(&self) -> &[Box<dyn Term>] {
+        &self.ingredients.terms
+    }
+
+    /// Inputs in their order in [`State::controls`].
+    pub fn controls(&self) -> &[Control] {
+        &self.ingredients.controls
+    }
+
+    /// Prescribed motion.
+    pub fn supports(&self) -> &Supports {
+        &self.ingredients.supports
+    }
+
+    /// The pressure space.
+    pub fn space(&self) -> &'static dyn PressureSpace {
+        self.ingredients.space
+    }
+
+    /// Which unknown is what.
+    pub fn numbering(&self) -> &Numbering {
+        &self.numbering
+    }
+
+    /// The structure of the factorised tangent.
+    pub fn symbolic(&self) -> &Arc<Symbolic> {
+        &self.symbolic
+    }
+
+    /// A zero matrix with the pattern of the tangent.
+    pub fn matrix(&self) -> SymmetricMatrix {
+        SymmetricMatrix::zeros(self.pattern.clone())
+    }
+
+    /// Operations of one factorisation, an addition and a multiplication counted as two.
+    pub fn factor_flops(&self) -> f64 {
+        self.ordering_flops
+    }
+
+    /// Characteristic element size, mm: the cube root of the mean element volume.
+    pub fn element_size(&self) -> f64 {
+        (self.ingredients.volume / self.mesh().elements() as f64).cbrt()
+    }
+
+    /// Reference volume of the tissue, mm3.
+    pub fn volume(&self) -> f64 {
+        self.ingredients.volume
+    }
+
+    /// mu V^(2/3), mN: the force that strains the whole body by about one.
+    pub fn force_scale(&self) -> f64 {
+        self.ingredients.shear_modulus * self.ingredients.volume.cbrt().powi(2)
+    }
+
+    /// mu / h, mN/mm3: turns a volume residual into a force, so that norms add like with like.
+    pub fn volume_scale(&self) -> f64 {
+        self.ingredients.shear_modulus / self.element_size()
+    }
+
+    /// The reference state: no displacement, no pressure, all controls and loads zero.
+    pub fn rest(&self) -> State {
+        State {
+            u: vec![[0.0; 3]; self.mesh().parameters.len()],
+            p: vec![0.0; self.numbering.pressures()],
+            controls: vec![0.0; self.controls().len()],
+            load: 0.0,
+        }
+    }
+
+    /// Energy and forces of all terms at a state; with [`Want::Stiffness`] the workspace then holds the element
+    /// stiffnesses for [`Model::assemble`]. `gap` is the outstanding motion of prescribed parameters.
+    pub fn evaluate(
+        &self,
+        state: &State,
+        want: Want,
+        gap: Option<&[[f64; 3]]>,
+        workspace: &mut Workspace,
+    ) -> Evaluation {
+        self.parts().evaluate(state, want, gap, workspace)
+    }
+
+    /// The tangent d2Pi/d(unknowns)2 from the last evaluation that wanted it.
+    pub fn assemble(&self, workspace: &Workspace, matrix: &mut SymmetricMatrix) {
+        self.parts().assemble(workspace, matrix);
+    }
+
+    /// dr/d(control) for the unknowns: the force per unit of a control.
+    pub fn control_force(&self, state: &State, control: usize) -> Vec<f64> {
+        self.force_of(
+            state,
+            |term| term.controls().contains(&control),
+            |term, at, force| {
+                term.add_control_force(control, at, force);
+            },
+        )
+    }
+
+    /// dr/d(load) for the unknowns.
+    pub fn load_force(&self, state: &State) -> Vec<f64> {
+        self.force_of(state, |term| term.is_load(), |term, at, force| term.add_load_force(at, force))
+    }
+
+    fn force_of(
+        &self,
+        state: &State,
+        chosen: impl Fn(&dyn Term) -> bool,
+        add: impl Fn(&dyn Term, &ElementState<'_>, &mut [[f64; 64]; 3]),
+    ) -> Vec<f64> {
+        let terms: Vec<&dyn Term> = self.terms().iter().map(Box::as_ref).filter(|t| chosen(*t)).collect();
+        let mut total = vec![0.0; self.numbering.unknowns()];
+        for element in 0..self.mesh().elements() {
+            if !terms.iter().any(|t| t.acts_on(element)) {
+                continue;
+            }
+            let mut force = [[0.0; 64]; 3];
+            self.with_local(state, element, |at| {
+                for term in terms.iter().filter(|t| t.acts_on(element)) {
+                    add(*term, at, &mut force);
+                }
+            });
+            for run in self.numbering.runs[element].iter().filter(|r| r.local < 192) {
+                for step in 0..run.length {
+                    let local = run.local + step;
+                    total[run.unknown + step] += run.scale * force[local / 64][local % 64];
+                }
+            }
+        }
+        total
+    }
+
+    /// Quadrature points of each term in one evaluation.
+    pub fn points(&self) -> impl Iterator<Item = usize> + '_ {
+        let active = |t: &dyn Term| (0..self.mesh().elements()).filter(|e| t.acts_on(*e)).map(|e| t.points(e)).sum();
+        self.terms().iter().map(move |t| active(t.as_ref()))
+    }
+
+    /// Calls `f` with the local view of a state in one element.
+    pub fn with_local<R>(&self, state: &State, element: usize, f: impl FnOnce(&ElementState<'_>) -> R) -> R {
+        let local = self.parts().local(state, element);
+        f(&ElementState {
+            element,
+            x: &local.x,
+            u: &local.u,
+            p: &local.p,
+            controls: &state.controls,
+            load: state.load,
+        })
+    }
+
+    /// Work of dead loads on the displacement of a state, uJ.
+    pub fn external_work(&self, state: &State) -> f64 {
+        let loads: Vec<_> = self.terms().iter().filter(|t| t.is_load()).collect();
+        if loads.is_empty() {
+            return 0.0;
+        }
+        (0..self.mesh().elements())
+            .map(|e| self.with_local(state, e, |at| loads.iter().map(|t| t.external_work(at)).sum::<f64>()))
+            .sum()
+    }
+
+    /// Current parameters x = X + u.
+    pub fn current(&self, state: &State) -> Vec<[f64; 3]> {
+        let add = |(x, u): (&[f64; 3], &[f64; 3])| std::array::from_fn(|i| x[i] + u[i]);
+        self.mesh().parameters.iter().zip(&state.u).map(add).collect()
+    }
+
+    /// Adds `factor` x `direction` (one entry per unknown) to the unknowns of a state.
+    pub fn advance(&self, state: &mut State, direction: &[f64], factor: f64) {
+        for (parameter, u) in state.u.iter_mut().enumerate() {
+            for (component, u) in u.iter_mut().enumerate() {
+                if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                    *u += factor * direction[unknown];
+                }
+            }
+        }
+        for (index, p) in state.p.iter_mut().enumerate() {
+            *p += factor * direction[self.numbering.pressure_unknown(index)];
+        }
+    }
+
+    /// The free displacements of a direction, one triple per global parameter; prescribed entries are zero.
+    pub fn displacement_of(&self, direction: &[f64]) -> Vec<[f64; 3]> {
+        (0..self.mesh().parameters.len())
+            .map(|parameter| {
+                std::array::from_fn(|component| {
+                    self.numbering.displacement_unknown(parameter, component).map_or(0.0, |k| direction[k])
+                })
+            })
+            .collect()
+    }
+
+    fn parts(&self) -> Parts<'_> {
+        let Ingredients { mesh, terms, .. } = &self.ingredients;
+        Parts { mesh, terms, numbering: &self.numbering, plan: &self.plan }
+    }
+}

@@ -1,0 +1,197 @@
+//! Supports: parameters of the displacement that are prescribed.
+//!
+//! On a face xi_d = const the values and the in-plane derivatives of the tricubic Hermite basis depend only on the
+//! face's own parameters without a derivative along d. Prescribing these prescribes the whole face exactly and leaves
+//! the derivatives through it free.
+
+use crate::math::tensor::{IDENTITY, Matrix, Vector, apply, cross, dot, normalised, rotation, subtract};
+use crate::mesh::Mesh;
+use crate::mesh::face::Face;
+
+/// A prescribed motion of a set of faces.
+#[derive(Debug, Clone)]
+pub enum Support {
+    /// No motion.
+    Clamp {
+        /// The faces.
+        faces: Vec<Face>,
+    },
+    /// No motion along one axis: the faces lie in a plane normal to it.
+    Symmetry {
+        /// The faces.
+        faces: Vec<Face>,
+        /// The axis, 0 to 2.
+        axis: usize,
+    },
+    /// A rigid rotation about an axis, in proportion to the load factor.
+    Rotate {
+        /// The faces.
+        faces: Vec<Face>,
+        /// Unit vector.
+        axis: Vector,
+        /// A point on the axis, mm.
+        through: Vector,
+        /// Angle at full load, radians.
+        angle: f64,
+    },
+}
+
+/// All supports of a model: which parameters are prescribed, and to what.
+#[derive(Debug, Clone, Default)]
+pub struct Supports {
+    supports: Vec<Support>,
+    /// Per support, the global parameters that it prescribes, ascending.
+    parameters: Vec<Vec<usize>>,
+    /// Per global parameter and component, the support that prescribes it.
+    owner: Vec<[Option<usize>; 3]>,
+}
+
+/// Two supports that prescribe the same parameter to different values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conflict {
+    /// Indices of the two supports.
+    pub supports: (usize, usize),
+    /// The node where they meet.
+    pub node: usize,
+}
+
+impl Supports {
+    /// Of a mesh. Supports may overlap only where they agree.
+    pub fn new(mesh: &Mesh, supports: Vec<Support>) -> Result<Supports, Conflict> {
+        let mut owner: Vec<[Option<usize>; 3]> = vec![[None; 3]; mesh.parameters.len()];
+        let mut parameters = Vec::with_capacity(supports.len());
+        for (index, support) in supports.iter().enumerate() {
+            let (faces, components) = support.reach();
+            let own = face_parameters(mesh, faces);
+            for &parameter in &own {
+                for component in components.clone() {
+                    let slot = &mut owner[parameter][component];
+                    match *slot {
+                        Some(other) if !agree(mesh, &supports[other], support, parameter, component) => {
+                            let node = mesh.parameter_node[parameter];
+                            return Err(Conflict { supports: (other, index), node });
+                        }
+                        Some(_) => {}
+                        None => *slot = Some(index),
+                    }
+                }
+            }
+            parameters.push(own);
+        }
+        Ok(Supports { supports, parameters, owner })
+    }
+
+    /// Whether a component of a global parameter is prescribed.
+    pub fn fixes(&self, parameter: usize, component: usize) -> bool {
+        self.owner[parameter][component].is_some()
+    }
+
+    /// The supports in the order given.
+    pub fn iter(&self) -> impl Iterator<Item = &Support> {
+        self.supports.iter()
+    }
+
+    /// Whether anything moves with the load factor.
+    pub fn move_with_load(&self) -> bool {
+        self.supports.iter().any(|s| matches!(s, Support::Rotate { angle, .. } if *angle != 0.0))
+    }
+
+    /// The prescribed displacements at a load factor: (parameter, component, mm).
+    pub fn prescribed(&self, mesh: &Mesh, load: f64) -> Vec<(usize, usize, f64)> {
+        let mut all = Vec::new();
+        for (parameter, owners) in self.owner.iter().enumerate() {
+            for (component, owner) in owners.iter().enumerate() {
+                if let Some(owner) = owner {
+                    let u = self.supports[*owner].displacement(mesh, parameter, load);
+                    all.push((parameter, component, u[component]));
+                }
+            }
+        }
+        all
+    }
+
+    /// For every rotation in turn: (torque about its axis in mN mm, force along it in mN) that the support exerts on
+    /// the body, from the forces dPi/du on all parameters and the current parameters of x.
+    pub fn rotation_reactions(&self, mesh: &Mesh, force: &[Vector], x: &[Vector]) -> Vec<(f64, f64)> {
+        let mut reactions = Vec::new();
+        for (support, parameters) in self.supports.iter().zip(&self.parameters) {
+            let Support::Rotate { axis, through, .. } = support else { continue };
+            let (mut torque, mut axial) = (0.0, 0.0);
+            for &parameter in parameters {
+                // the virtual rotation of the face turns derivatives as vectors and values about the axis
+                let arm = if mesh.parameter_derivative[parameter] == 0 {
+                    axial += dot(force[parameter], *axis);
+                    subtract(x[parameter], *through)
+                } else {
+                    x[parameter]
+                };
+                torque += dot(force[parameter], cross(*axis, arm));
+            }
+            reactions.push((torque, axial));
+        }
+        reactions
+    }
+}
+
+impl Support {
+    fn reach(&self) -> (&[Face], std::ops::Range<usize>) {
+        match self {
+            Support::Clamp { faces } | Support::Rotate { faces, .. } => (faces, 0..3),
+            Support::Symmetry { faces, axis } => (faces, *axis..*axis + 1),
+        }
+    }
+
+    /// Displacement of a global parameter: u = (R - I)(X - c) for values, (R - I) X for derivatives.
+    fn displacement(&self, mesh: &Mesh, parameter: usize, load: f64) -> Vector {
+        match self {
+            Support::Clamp { .. } | Support::Symmetry { .. } => [0.0; 3],
+            Support::Rotate { axis, through, angle, .. } => {
+                let r = rotation(*axis, load * angle);
+                let turn: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| r[i][j] - IDENTITY[i][j]));
+                let x = mesh.parameters[parameter];
+                let value = mesh.parameter_derivative[parameter] == 0;
+                apply(&turn, if value { subtract(x, *through) } else { x })
+            }
+        }
+    }
+}
+
+fn agree(mesh: &Mesh, a: &Support, b: &Support, parameter: usize, component: usize) -> bool {
+    let (u, v) = (a.displacement(mesh, parameter, 1.0), b.displacement(mesh, parameter, 1.0));
+    (u[component] - v[component]).abs() <= 1e-12 * (1.0 + u[component].abs())
+}
+
+/// The global parameters on which the field on these faces depends: those at the face's nodes without a derivative
+/// through the face. Ascending, without repetition.
+pub fn face_parameters(mesh: &Mesh, faces: &[Face]) -> Vec<usize> {
+    let mut all = Vec::new();
+    let per_node = mesh.element.parameters_per_node();
+    for face in faces {
+        for node in face.side.nodes() {
+            for derivative in 0..per_node {
+                if derivative >> face.side.direction & 1 == 1 {
+                    continue;
+                }
+                let terms = mesh.map.terms(face.element, node * per_node + derivative);
+                all.extend(terms.iter().map(|t| t.global as usize));
+            }
+        }
+    }
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+/// The axis that a set of faces is normal to, or `None` where they are not all in planes normal to one axis.
+pub fn normal_axis(mesh: &Mesh, faces: &[Face]) -> Option<usize> {
+    let samples = [[0.1, 0.2], [0.9, 0.1], [0.5, 0.5], [0.2, 0.9], [0.8, 0.8]];
+    let normals = faces.iter().flat_map(|face| {
+        let local = mesh.local(face.element);
+        samples.map(|st| {
+            let (_, jacobian) = crate::mesh::position_and_jacobian(mesh.element, &local, face.side.lift(st));
+            normalised(face.side.area_vector(&jacobian))
+        })
+    });
+    let normals: Vec<Vector> = normals.collect();
+    (0..3).find(|&axis| !normals.is_empty() && normals.iter().all(|n| n[axis].abs() > 1.0 - 1e-12))
+}
