@@ -25,16 +25,18 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::{Conj, MatMut, Par, Side};
+use rayon::prelude::*;
 
 use super::ordering::Ordering;
 use super::refine;
 use super::sparse::{BlockPattern, SymmetricMatrix};
 use crate::{Error, Result};
 
-/// How faer cuts its dense products. Fixed: the cut decides in which order numbers are added, the threads do not.
-fn parallelism() -> Par {
-    Par::rayon(std::env::var("PAR").ok().and_then(|s| s.parse().ok()).unwrap_or(2))
-}
+/// Dense products run on the calling thread. faer can cut them, but the fronts of a thin body are so small that two
+/// threads gain nothing, and the cut would change the bits.
+const PARALLELISM: Par = Par::Seq;
+/// Right-hand sides solved together by one thread.
+const BATCH: usize = 8;
 /// Passes of equilibration: a row with a zero diagonal gets its scale from the rows it couples to.
 const EQUILIBRATION_PASSES: usize = 3;
 /// A pivot of the equilibrated matrix below this is rounding, not a number.
@@ -147,8 +149,6 @@ pub struct Factor {
     /// Exchanges within supernodes: forward and inverse.
     pivots: (Vec<usize>, Vec<usize>),
     scratch: MemBuffer,
-    /// Right-hand sides for which `scratch` suffices.
-    scratch_columns: usize,
     inertia: Inertia,
     is_valid: bool,
     work: Work,
@@ -165,10 +165,8 @@ impl Factor {
         let mut values = Vec::new();
         values.try_reserve_exact(symbolic.cholesky.len_val()).map_err(|_| too_large())?;
         values.resize(symbolic.cholesky.len_val(), 0.0);
-        let numeric =
-            symbolic.cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(parallelism(), Default::default());
-        let solve = symbolic.cholesky.solve_in_place_scratch::<f64>(1, parallelism());
-        let scratch = MemBuffer::try_new(numeric.or(solve)).map_err(|_| too_large())?;
+        let need = symbolic.cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(PARALLELISM, Default::default());
+        let scratch = MemBuffer::try_new(need).map_err(|_| too_large())?;
         Ok(Self {
             scale: vec![1.0; n],
             scaled: vec![0.0; symbolic.pattern.nnz()],
@@ -176,7 +174,6 @@ impl Factor {
             subdiagonal: vec![0.0; n],
             pivots: ((0..n).collect(), (0..n).collect()),
             scratch,
-            scratch_columns: 1,
             inertia: Inertia::default(),
             is_valid: n == 0,
             work: Work::default(),
@@ -211,7 +208,7 @@ impl Factor {
                 &mut self.pivots.1,
                 SparseColMatRef::new(pattern.as_faer(), &self.scaled),
                 Side::Lower,
-                parallelism(),
+                PARALLELISM,
                 MemStack::new(&mut self.scratch),
                 Default::default(),
             );
@@ -248,7 +245,7 @@ impl Factor {
             return Err(Error::NotFactored);
         }
         let weights: Vec<f64> = self.scale.iter().map(|s| s * s).collect();
-        let quality = refine::solve(a, |x| self.precondition(x, columns), &weights, rhs, columns, tolerance)?;
+        let quality = refine::solve(a, |x| self.precondition(x), &weights, rhs, columns, tolerance)?;
         self.work.solves += columns;
         self.work.sweeps += quality.sweeps;
         self.work.solve_time += start.elapsed();
@@ -256,32 +253,26 @@ impl Factor {
     }
 
     /// x <- S P^T (L B L^T)^-1 P S x for each column.
-    fn precondition(&mut self, x: &mut [f64], columns: usize) -> Result<()> {
-        let (symbolic, n) = (&self.symbolic, self.scale.len());
-        if x.is_empty() {
-            return Ok(());
-        }
-        if columns > self.scratch_columns {
-            let need = symbolic.cholesky.solve_in_place_scratch::<f64>(columns, parallelism());
-            let numeric =
-                symbolic.cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(parallelism(), Default::default());
-            self.scratch = MemBuffer::try_new(need.or(numeric))
-                .map_err(|_| Error::FactorTooLarge { unknowns: n, entries: symbolic.factor_nnz })?;
-            self.scratch_columns = columns;
-        }
+    fn precondition(&self, x: &mut [f64]) {
+        let n = self.scale.len();
+        let cholesky = &self.symbolic.cholesky;
+        let pivots = PermRef::new_checked(&self.pivots.0, &self.pivots.1, n);
+        let factor = IntranodeLbltRef::new(cholesky, &self.values, &self.subdiagonal, pivots);
         let scale_rows = |x: &mut [f64]| {
             x.chunks_mut(n).for_each(|column| column.iter_mut().zip(&self.scale).for_each(|(x, s)| *x *= s));
         };
-        scale_rows(x);
-        let pivots = PermRef::new_checked(&self.pivots.0, &self.pivots.1, n);
-        IntranodeLbltRef::new(&symbolic.cholesky, &self.values, &self.subdiagonal, pivots).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(x, n, columns),
-            parallelism(),
-            MemStack::new(&mut self.scratch),
-        );
-        scale_rows(x);
-        Ok(())
+        x.par_chunks_mut(n * BATCH).for_each(|x| {
+            let columns = x.len() / n;
+            let mut scratch = MemBuffer::new(cholesky.solve_in_place_scratch::<f64>(columns, PARALLELISM));
+            scale_rows(x);
+            factor.solve_in_place_with_conj(
+                Conj::No,
+                MatMut::from_column_major_slice_mut(x, n, columns),
+                PARALLELISM,
+                MemStack::new(&mut scratch),
+            );
+            scale_rows(x);
+        });
     }
 
     /// Signs of the eigenvalues of the matrix last factored.
@@ -304,11 +295,11 @@ impl Factor {
         self.work
     }
 
-    /// Signs of the blocks of B. A block of order 2 was chosen as a pivot because its determinant is negative.
+    /// Signs of the blocks of B.
     fn count_signs(&self) -> Result<Inertia> {
         let mut inertia = Inertia::default();
         let SymbolicCholeskyRaw::Supernodal(structure) = self.symbolic.cholesky.raw() else {
-            return Ok(inertia);
+            return Ok(inertia); // only the empty matrix has no supernodes
         };
         let pivots = PermRef::new_checked(&self.pivots.0, &self.pivots.1, self.scale.len());
         let factor = SupernodalIntranodeLbltRef::new(structure, &self.values, &self.subdiagonal, pivots);
@@ -317,21 +308,23 @@ impl Factor {
             let mut j = 0;
             while j < block.ncols() {
                 let (d, below) = (block[(j, j)], self.subdiagonal[first + j]);
-                if !(d.is_finite() && below.is_finite()) || (d == 0.0 && below == 0.0) {
-                    return Err(Error::Singular { unknown: self.unknown_of_pivot(first + j) });
-                }
-                if below != 0.0 {
-                    inertia.positive += 1;
-                    inertia.negative += 1;
-                    j += 2;
-                } else {
-                    match d {
-                        d if d.abs() <= ZERO_PIVOT => inertia.zero += 1,
-                        d if d > 0.0 => inertia.positive += 1,
+                // eigenvalues of a block of order 2 from its mean and its radius
+                let order = if below == 0.0 { 1 } else { 2 };
+                let (mean, radius) = match order {
+                    1 => (d, 0.0),
+                    _ => (0.5 * (d + block[(j + 1, j + 1)]), (0.5 * (d - block[(j + 1, j + 1)])).hypot(below)),
+                };
+                for eigenvalue in [mean + radius, mean - radius].into_iter().take(order) {
+                    if !eigenvalue.is_finite() || eigenvalue == 0.0 {
+                        return Err(Error::Singular { unknown: self.unknown_of_pivot(first + j) });
+                    }
+                    match eigenvalue {
+                        value if value.abs() <= ZERO_PIVOT => inertia.zero += 1,
+                        value if value > 0.0 => inertia.positive += 1,
                         _ => inertia.negative += 1,
                     }
-                    j += 1;
                 }
+                j += order;
             }
         }
         Ok(inertia)

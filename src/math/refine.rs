@@ -26,7 +26,7 @@ const LEAST_FALL: f64 = 0.9;
 /// Norms and products are weighted: <a, b> = sum of w_i a_i b_i.
 pub(super) fn solve(
     a: &SymmetricMatrix,
-    mut precondition: impl FnMut(&mut [f64]) -> Result<()>,
+    precondition: impl Fn(&mut [f64]),
     weights: &[f64],
     rhs: &mut [f64],
     columns: usize,
@@ -58,7 +58,7 @@ pub(super) fn solve(
             break;
         }
         let mut z = r.clone();
-        precondition(&mut z)?;
+        precondition(&mut z);
         let mut q = vec![0.0; z.len()];
         a.multiply_columns(&z, &mut q, columns);
         for column in 0..columns {

@@ -61,9 +61,9 @@ impl BlockPattern {
         let mut neighbour_start = vec![0];
         let mut offsets = Vec::new();
         let mut seen_by = vec![usize::MAX; groups];
-        for g in 0..groups {
+        for (g, own_cliques) in cliques_of.iter().enumerate() {
             let first = neighbours.len();
-            for &h in cliques_of[g].iter().flat_map(|&index| &cliques[index]) {
+            for &h in own_cliques.iter().flat_map(|&index| &cliques[index]) {
                 if h > g && seen_by[h] != g {
                     seen_by[h] = g;
                     neighbours.push(h);
