@@ -3,7 +3,6 @@
 use super::Mesh;
 use super::element::{Element, ends};
 use super::face::{Face, Side};
-use super::map::{ElementMap, Term};
 use std::collections::BTreeMap;
 
 /// A box of n1 x n2 x n3 equal elements with its sides along the axes. Nodes and elements are numbered x fastest, then
@@ -52,19 +51,5 @@ pub fn block(element: &'static dyn Element, origin: [f64; 3], size: [f64; 3], el
             }
         }
     }
-    let locals = corners.iter().flat_map(|nodes: &[usize; 8]| {
-        nodes.iter().flat_map(move |&node| {
-            (0..per_node).map(move |d| vec![Term { global: (node * per_node + d) as u32, scale: 1.0 }])
-        })
-    });
-    Mesh {
-        element,
-        map: ElementMap::new(element.functions(), locals),
-        parameters,
-        nodes,
-        parameter_node: (0..nodes * per_node).map(|p| p / per_node).collect(),
-        parameter_derivative: (0..nodes * per_node).map(|p| (p % per_node) as u8).collect(),
-        corners,
-        named_faces,
-    }
+    Mesh { named_faces, ..Mesh::new(element, parameters, corners) }
 }

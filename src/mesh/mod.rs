@@ -46,6 +46,29 @@ pub struct MaterialPoint {
 }
 
 impl Mesh {
+    /// A mesh whose elements use the parameters of their corner nodes as they are, without scale factors.
+    ///
+    /// `parameters`: per node in turn, one triple per parameter of the element's basis (mm, or mm per unit xi);
+    /// `corners`: the eight nodes of each element.
+    pub fn new(element: &'static dyn Element, parameters: Vec<Vector>, corners: Vec<[usize; 8]>) -> Mesh {
+        let per_node = element.parameters_per_node();
+        let locals = corners.iter().flat_map(|nodes| {
+            nodes.iter().flat_map(move |&node| {
+                (0..per_node).map(move |d| vec![map::Term { global: (node * per_node + d) as u32, scale: 1.0 }])
+            })
+        });
+        Mesh {
+            element,
+            map: ElementMap::new(element.functions(), locals),
+            nodes: parameters.len() / per_node,
+            parameter_node: (0..parameters.len()).map(|p| p / per_node).collect(),
+            parameter_derivative: (0..parameters.len()).map(|p| (p % per_node) as u8).collect(),
+            parameters,
+            corners,
+            named_faces: BTreeMap::new(),
+        }
+    }
+
     /// The number of elements.
     pub fn elements(&self) -> usize {
         self.corners.len()

@@ -1,0 +1,4 @@
+//! Closed forms and solved cases from an independent implementation, one file each.
+
+mod prescribed_state;
+mod support;
