@@ -2,6 +2,8 @@
 #![warn(missing_docs)]
 //! risorius finds out which muscles moved a face.
 
+pub mod cli;
 pub mod error;
+pub mod scene;
 
-pub use error::{Error, Result};
+pub use error::{Error, Place, Result, Warning};
