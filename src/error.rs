@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong, with its numbers, place and units.
+/// What went wrong, with its numbers, place and units. Below 128 bytes, since every `Result` carries it.
 ///
 /// `Display` gives the message (what, where, how much); [`Error::code`] the stable code, [`Error::help`] the
 /// edit or command that mends it, [`Error::exit_code`] what the process returns.
@@ -18,7 +18,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub enum Error {
     // ---- C: problem file ------------------------------------------------------------------------------
     /// Every mistake of a file at once, in the order of its lines.
-    #[error("{} mistakes:{}", .0.len(), .0.iter().map(|mistake| format!("\n  {mistake}")).collect::<String>())]
+    #[error("{} mistakes:{}", .0.len(), .0.iter().map(one_line).collect::<String>())]
     Mistakes(Vec<Error>),
     /// The text cannot be read as TOML (or as UTF-8) at all.
     #[error("the file is not valid TOML: {message}")]
@@ -32,7 +32,7 @@ pub enum Error {
     #[error("unknown key `{key}` in {table}")]
     UnknownKey {
         /// The key as written.
-        key: String,
+        key: Box<str>,
         /// The table that holds it.
         table: String,
         /// The nearest known key, or all of them.
@@ -46,7 +46,7 @@ pub enum Error {
         /// The table that should hold them.
         table: String,
         /// The missing keys, each in backticks.
-        keys: String,
+        keys: Box<str>,
         /// What to add.
         help: String,
         /// The header of the table.
@@ -60,7 +60,7 @@ pub enum Error {
         /// What belongs there.
         expected: String,
         /// What stands there.
-        found: String,
+        found: Box<str>,
         /// The value.
         place: Place,
     },
@@ -70,7 +70,7 @@ pub enum Error {
         /// The key, as a path from the root of the file.
         key: String,
         /// The value as written.
-        value: String,
+        value: Box<str>,
         /// The allowed range, in words.
         allowed: String,
         /// The value.
@@ -82,7 +82,7 @@ pub enum Error {
         /// The key, as a path from the root of the file.
         key: String,
         /// The word as written.
-        value: String,
+        value: Box<str>,
         /// The nearest allowed word, and all of them.
         help: String,
         /// The word.
@@ -94,14 +94,14 @@ pub enum Error {
         /// The key, as a path from the root of the file.
         key: String,
         /// How many there are, with what is counted.
-        found: String,
+        found: Box<str>,
         /// How many are needed, and why.
         expected: String,
         /// The list.
         place: Place,
     },
     /// Two things of a kind share a name.
-    #[error("two {kind}s are called `{name}`: lines {first_line} and {}", place.line)]
+    #[error("a second {kind} is called `{name}`: the first is in line {first_line}")]
     DuplicateName {
         /// What carries the name: `muscle`, `probe`, `marker`, `column`.
         kind: &'static str,
@@ -144,7 +144,7 @@ pub enum Error {
         /// The keys to choose from.
         choices: String,
         /// The chosen ones, or `none`.
-        found: String,
+        found: Box<str>,
         /// The header of the table.
         place: Place,
     },
@@ -249,7 +249,7 @@ impl Error {
             Error::WrongType { expected, found, key, .. } => wrong_type_help(key, expected, found),
             Error::DuplicateName { kind, .. } => Some(format!("give every {kind} its own name")),
             Error::NotInThisVersion { instead, .. } => Some(instead.clone()),
-            Error::NotExactlyOne { found, .. } if found == "none" => Some("add the one you mean".into()),
+            Error::NotExactlyOne { found, .. } if &**found == "none" => Some("add the one you mean".into()),
             Error::NotExactlyOne { .. } => Some("keep one; write a table of its own for every other".into()),
             Error::MissingFile { .. } => Some("a relative path starts at the folder of the problem file".into()),
             Error::TimeOrder { .. } => Some("sort the rows by time, and keep one row per time".into()),
@@ -289,21 +289,32 @@ impl Error {
     }
 }
 
+/// A mistake as a line of a list.
+fn one_line(mistake: &Error) -> String {
+    let place = mistake.place().map(|place| format!("{place}: ")).unwrap_or_default();
+    format!("\n  {place}{} {mistake}", mistake.code())
+}
+
 /// The remedy for the classic slips of TOML.
 fn syntax_help(message: &str) -> Option<String> {
-    if message.contains("duplicate key") {
-        Some("keep one of the two; a table that may come several times is written [[name]]".into())
-    } else if message.contains("string values must be quoted") {
-        Some("write text in quotes: \"...\"".into())
-    } else {
-        None
-    }
+    const REMEDIES: [(&str, &str); 8] = [
+        ("duplicate key", "keep one of the two; a table that may come several times is written [[name]]"),
+        ("must be quoted", "write text in quotes: \"...\""),
+        ("invalid boolean", "write text in quotes: \"...\""),
+        ("string, expected `\"`", "the quote that ends the text is missing"),
+        ("unclosed table", "close the header with ]"),
+        ("unquoted key", "put a key with other characters in quotes: \"...\" = "),
+        ("missing comma", "look for a comma, bracket or brace that is missing just before"),
+        ("array", "look for a comma or bracket that is missing here or in a line before"),
+    ];
+    REMEDIES.iter().find(|(words, _)| message.contains(words)).map(|(_, remedy)| remedy.to_string())
 }
 
 /// The remedy for the classic confusions between kinds of value.
 fn wrong_type_help(key: &str, expected: &str, found: &str) -> Option<String> {
-    let number = expected.contains("number");
-    if number && found.starts_with("text") {
+    let quoted = found.strip_prefix("text \"").and_then(|text| text.strip_suffix('"'));
+    let quoted_number = quoted.is_some_and(|text| text.trim().parse::<f64>().is_ok());
+    if expected.ends_with("number") && quoted_number {
         Some("write the number without quotes".into())
     } else if expected.starts_with("text") && !found.starts_with("text") {
         Some("write it in quotes".into())
@@ -353,6 +364,14 @@ impl Place {
             length: count(&text[start..end]).max(1),
             text: text.into(),
         }
+    }
+
+    /// From the start of this place to the end of `other`, if that is on the same line; otherwise `other`.
+    pub fn until(&self, other: &Place) -> Place {
+        if (&self.file, self.line) != (&other.file, other.line) || other.column < self.column {
+            return other.clone();
+        }
+        Place { length: other.column - self.column + other.length, ..self.clone() }
     }
 }
 

@@ -40,8 +40,8 @@ pub fn render_error(error: &Error, colour: bool) -> String {
     });
     let mut text = messages.collect::<Vec<_>>().join("\n");
     if mistakes.len() > 1 {
-        let total =
-            Group::with_title(Level::ERROR.primary_title(format!("{} mistakes, nothing was run", mistakes.len())));
+        let total = format!("{} mistakes, nothing was run", mistakes.len());
+        let total = Group::with_title(Level::ERROR.primary_title(total));
         text = format!("{text}\n{}\n", renderer(colour).render(&[total]));
     }
     text

@@ -53,7 +53,7 @@ impl<'a> Item<'a> {
         self.mistakes.add(Error::WrongType {
             key: self.path.clone(),
             expected: expected.into(),
-            found: self.node.describe(),
+            found: self.node.describe().into(),
             place: self.node.place.clone(),
         });
         None
@@ -65,7 +65,7 @@ impl<'a> Item<'a> {
         let unit = unit_of(key).map(|unit| format!(" {unit}")).unwrap_or_default();
         self.mistakes.add(Error::OutOfRange {
             key: self.path.clone(),
-            value: format!("{written}{unit}"),
+            value: format!("{written}{unit}").into(),
             allowed: allowed.into(),
             place: self.node.place.clone(),
         });
@@ -312,19 +312,22 @@ impl<'a> Table<'a> {
         self.mistakes.add(Error::NotExactlyOne {
             table: self.describe(),
             choices: quoted(choices),
-            found: if found.is_empty() { "none".into() } else { quoted(found) },
+            found: if found.is_empty() { "none".into() } else { quoted(found).into() },
             place: self.place(),
         });
         None
     }
 
-    /// Notes that the value of the first of `keys` contradicts the others; points at the first of them that is written.
-    pub fn contradiction<T>(&self, keys: &[&'static str], value: f64, allowed: &str) -> Option<T> {
+    /// Notes that `key` contradicts the key `other`; points at `key`, or at `other` where `key` has its default `value`.
+    pub fn contradiction<T>(&self, key: &str, other: &str, value: f64, allowed: &str) -> Option<T> {
         let entries = self.node.entries().unwrap_or_default();
-        let written = keys.iter().find_map(|key| entries.iter().find(|entry| entry.key == *key));
-        let node = written.map_or(self.node, |entry| &entry.node);
-        let path = format!("{}.{}", self.path, keys.first().unwrap_or(&""));
-        Item { node, path, mistakes: self.mistakes }.out_of_range(&format!("{value:?}"), allowed)
+        let node = |key: &str| entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node);
+        let written = match node(key).map(|node| &node.value) {
+            Some(Value::Number { written, .. }) => written.clone(),
+            _ => format!("{value:?}"),
+        };
+        let (node, path) = (node(key).or(node(other)).unwrap_or(self.node), format!("{}.{key}", self.path));
+        Item { node, path, mistakes: self.mistakes }.out_of_range(&written, allowed)
     }
 
     fn describe(&self) -> String {
@@ -348,8 +351,10 @@ impl<'a> Table<'a> {
         let unknown: Vec<_> = self.unknown().collect();
         let complete = unknown.is_empty() && self.missing.is_empty();
         for (key, place) in unknown {
-            let absent = self.asked.iter().copied().filter(|known| self.entry_key(known).is_none());
-            let help = match nearest(key, absent) {
+            let (absent, present): (Vec<&str>, Vec<&str>) =
+                self.asked.iter().copied().partition(|known| self.entry_key(known).is_none());
+            let near = nearest(key, absent.into_iter());
+            let help = match near {
                 Some(known) => {
                     // Told once: the misspelt key is the missing one.
                     self.missing.retain(|(missing, _)| *missing != known);
@@ -357,8 +362,10 @@ impl<'a> Table<'a> {
                     let unit = unit.map(|unit| format!(" (the unit is part of the key: a number in {unit})"));
                     format!("did you mean `{known}`?{}", unit.unwrap_or_default())
                 }
-                None if self.asked.is_empty() => "it must be empty".into(),
-                None => format!("it can hold: {}", self.asked.join(", ")),
+                None => match nearest(key, present.into_iter()) {
+                    Some(known) => format!("did you mean `{known}`? it is there already: remove one"),
+                    None => format!("it can hold: {}", self.asked.join(", ")),
+                },
             };
             let (key, table) = (key.into(), self.describe());
             self.mistakes.add(Error::UnknownKey { key, table, help, place: place.clone() });
@@ -367,7 +374,12 @@ impl<'a> Table<'a> {
             let keys = self.missing.iter().map(|(key, _)| format!("`{key}`")).collect::<Vec<_>>().join(", ");
             let examples = self.missing.iter().map(|(_, example)| *example).collect::<Vec<_>>().join("\n");
             let help = format!("add, for example:\n{examples}");
-            self.mistakes.add(Error::MissingKey { table: self.describe(), keys, help, place: self.place() });
+            self.mistakes.add(Error::MissingKey {
+                table: self.describe(),
+                keys: keys.into(),
+                help,
+                place: self.place(),
+            });
         }
         complete
     }

@@ -73,7 +73,7 @@ impl Curves {
             if cells.len() != header.len() {
                 mistakes.add(Error::WrongLength {
                     key: format!("line {}", line.number),
-                    found: format!("{} cells", cells.len()),
+                    found: format!("{} cells", cells.len()).into(),
                     expected: format!("{}, as the header has", header.len()),
                     place: line.place(0..line.text.len()),
                 });
@@ -159,7 +159,8 @@ impl Cell<'_> {
             Ok(number) if number.is_finite() => return Some(number),
             Ok(_) => mistakes.add(self.out_of_range(column, "a finite number")),
             Err(_) => {
-                let found = if self.text.is_empty() { "empty".into() } else { format!("\"{}\"", self.text) };
+                let found =
+                    if self.text.is_empty() { Box::from("empty") } else { format!("\"{}\"", self.text).into() };
                 let (key, expected, place) = (column.into(), "a number".into(), self.place.clone());
                 mistakes.add(Error::WrongType { key, expected, found, place });
             }

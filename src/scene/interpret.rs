@@ -119,7 +119,7 @@ fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
     let c2_kpa = table.required("c2_kpa", "c2_kpa = 0.2", |item| item.number(NOT_NEGATIVE));
     let (c1_kpa, c2_kpa) = (c1_kpa?, c2_kpa?);
     if c1_kpa + c2_kpa == 0.0 {
-        return table.contradiction(&["c1_kpa", "c2_kpa"], c1_kpa, "greater than 0 where c2_kpa is 0");
+        return table.contradiction("c1_kpa", "c2_kpa", c1_kpa, "greater than 0 where c2_kpa is 0");
     }
     Some(LawSpec::MooneyRivlin { c1_kpa, c2_kpa })
 }
@@ -184,7 +184,7 @@ fn blemker(table: &mut Table) -> Option<BlemkerSpec> {
     let (lambda_star, lambda_ofl) = (lambda_star?, lambda_ofl?);
     if lambda_star <= lambda_ofl {
         let allowed = format!("greater than lambda_ofl = {lambda_ofl:?}");
-        return table.contradiction(&["lambda_star", "lambda_ofl"], lambda_star, &allowed);
+        return table.contradiction("lambda_star", "lambda_ofl", lambda_star, &allowed);
     }
     Some(BlemkerSpec { sigma_max_kpa: sigma_max_kpa?, lambda_star, lambda_ofl, p1: p1?, p2: p2? })
 }
@@ -288,7 +288,7 @@ fn frames(table: &mut Table) -> Option<FramesSpec> {
     let (first, last) = (first?, last?);
     match last {
         Some(last) if last < first => {
-            table.contradiction(&["last"], last as f64, &format!("at least first = {first}"))
+            table.contradiction("last", "first", last as f64, &format!("at least first = {first}"))
         }
         _ => Some(FramesSpec { first, last, step: step? }),
     }
@@ -302,7 +302,7 @@ fn solver(table: &mut Table) -> Option<SolverSpec> {
     let step_min = table.or("step_min", default.step_min, |item| item.number(PART));
     let (step_max, step_min) = (step_max?, step_min?);
     if step_min > step_max {
-        return table.contradiction(&["step_min", "step_max"], step_min, &format!("at most step_max = {step_max:?}"));
+        return table.contradiction("step_min", "step_max", step_min, &format!("at most step_max = {step_max:?}"));
     }
     Some(SolverSpec { tolerance: tolerance?, max_iterations: max_iterations?, step_max, step_min })
 }

@@ -22,7 +22,7 @@ pub use spec::*;
 
 use crate::error::{Error, Result, Warning};
 use cursor::Mistakes;
-use references::{References, unique_names};
+use references::{References, flatten_controls, unique_names};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -114,10 +114,12 @@ fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], o
         std::path::absolute(folder).map_err(|source| Error::Io { action: "find", path: folder.into(), source })?;
     let mut root = Source::new(file, text).tree().map_err(Error::all)?;
     let mistakes = Mistakes::default();
+    flatten_controls(&mut root);
     for (index, argument) in overrides.iter().enumerate() {
         if let Err(mistake) = overrides::apply(&mut root, argument, index + 1) {
             mistakes.add(mistake);
         }
+        flatten_controls(&mut root);
     }
     for kind in ["muscle", "probe", "marker"] {
         unique_names(&root, kind, &mistakes);

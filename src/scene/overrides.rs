@@ -171,7 +171,10 @@ fn put(node: &mut Node, steps: &[Step], path: &str, value: Node, line: &Line) ->
                     put(&mut list[index], &steps[taken..], &format!("{path}.{name}"), value, line)
                 }
                 None => {
-                    let help = format!("{}; or count from 0: {path}[0]", help_for_name(key, &names, "names"));
+                    let help = format!(
+                        "{} An entry can also be counted, from 0: {path}[0]",
+                        help_for_name(key, &names, "names")
+                    );
                     Err(line.mistake(span.clone(), format!("no `{path}` is called `{key}`"), help))
                 }
             }

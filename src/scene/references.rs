@@ -23,7 +23,12 @@ pub(super) struct References {
 impl References {
     /// The muscles are those of the tree, even where the rest of their table is mistaken.
     pub fn new(root: &Node, folder: &Path, on_disk: bool) -> References {
-        let muscles = root.tables("muscle").iter().filter_map(|muscle| Some(muscle.name()?.0.to_string())).collect();
+        let mut muscles: Vec<String> = Vec::new();
+        for (name, _) in root.tables("muscle").iter().filter_map(Node::name) {
+            if !muscles.iter().any(|known| known == name) {
+                muscles.push(name.into());
+            }
+        }
         References { folder: folder.into(), muscles, on_disk, columns: RefCell::default() }
     }
 
@@ -67,24 +72,23 @@ impl References {
             // The type is wrong, which `table` notes.
             return item.table(|_| None);
         };
-        let mut named = Vec::new();
-        collect_names("", entries, &mut named);
         let mut seen = Vec::new();
-        let read = |(name, entry): &(String, &Entry)| {
-            let control = Item { node: &entry.node, path: format!("controls.{name}"), mistakes: item.mistakes };
-            let known = self.muscle(name, &entry.place, item.mistakes);
-            let first = first_use("control", name, &entry.place, &mut seen, item.mistakes);
-            let value = match entry.node.value {
+        let read = |Entry { key: name, place, node }: &Entry| {
+            let control = Item { node, path: format!("controls.{name}"), mistakes: item.mistakes };
+            let known = self.muscle(name, place, item.mistakes);
+            let first = first_use("control", name, place, &mut seen, item.mistakes);
+            let value = match node.value {
                 Value::Table(_) => control.table(|table| {
                     let path = table.required("csv", "{ csv = \"curves.csv\" }", |item| self.file(&item))?;
                     known.and_then(|()| self.column(&path, name, &control)).map(|()| ControlValue::Csv(path))
                 }),
                 _ => control.number(ACTIVATION).map(ControlValue::Constant),
             };
-            (known?, first?);
-            Some(ControlSpec { name: name.clone(), value: value?, place: entry.place.clone() })
+            known?;
+            first?;
+            Some(ControlSpec { name: name.clone(), value: value?, place: place.clone() })
         };
-        let controls: Vec<Option<ControlSpec>> = named.iter().map(read).collect();
+        let controls: Vec<Option<ControlSpec>> = entries.iter().map(read).collect();
         controls.into_iter().collect()
     }
 
@@ -130,17 +134,28 @@ impl References {
     }
 }
 
-/// The controls under `entries`. TOML reads the dot of `risorius.L = 0.1` as a table in a table; here it belongs to
-/// the name.
-fn collect_names<'a>(prefix: &str, entries: &'a [Entry], named: &mut Vec<(String, &'a Entry)>) {
-    for entry in entries {
-        let name = if prefix.is_empty() { entry.key.clone() } else { format!("{prefix}.{}", entry.key) };
-        match entry.node.entries() {
-            Some(inner) if !inner.is_empty() && inner.iter().all(|entry| entry.key != "csv") => {
-                collect_names(&name, inner, named);
-            }
-            _ => named.push((name, entry)),
-        }
+/// Makes `[controls]` a flat table. TOML reads the dot of `risorius.L = 0.1` as a table in a table; here it belongs
+/// to the name. A table that holds `csv` is a value, and so is an empty one.
+pub(super) fn flatten_controls(root: &mut Node) {
+    let Value::Table(tables) = &mut root.value else { return };
+    let controls = tables.iter_mut().find(|table| table.key == "controls");
+    if let Some(Entry { node: Node { value: Value::Table(entries), .. }, .. }) = controls {
+        *entries = entries.drain(..).flat_map(flat).collect();
+    }
+}
+
+fn flat(outer: Entry) -> Vec<Entry> {
+    match outer.node.value {
+        Value::Table(inner) if !inner.is_empty() && inner.iter().all(|entry| entry.key != "csv") => inner
+            .into_iter()
+            .flat_map(flat)
+            .map(|entry| Entry {
+                key: format!("{}.{}", outer.key, entry.key),
+                place: outer.place.until(&entry.place),
+                node: entry.node,
+            })
+            .collect(),
+        _ => vec![outer],
     }
 }
 

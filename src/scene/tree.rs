@@ -78,6 +78,8 @@ impl Node {
         let entry = self.entries().and_then(|entries| entries.iter().find(|entry| entry.key == key));
         match entry.map(|entry| &entry.node.value) {
             Some(Value::List(list)) => list,
+            // [muscle] for [[muscle]]: a mistake that is told elsewhere; what the table says still counts.
+            Some(Value::Table(_)) => entry.map(|entry| std::slice::from_ref(&entry.node)).unwrap_or_default(),
             _ => &[],
         }
     }
@@ -111,23 +113,36 @@ impl<'a> Source<'a> {
         if errors.is_empty() {
             Ok(Node { place: Place::whole(&self.file), value: Value::Table(self.entries(table.get_ref())) })
         } else {
-            Err(errors.iter().map(|error| self.syntax_error(error)).collect())
+            Err(self.syntax_errors(&errors))
         }
     }
 
     /// The tree of a text that is a single value.
     pub fn value(&self) -> Result<Node, Vec<Error>> {
         let (value, errors) = DeValue::parse_recoverable(self.text);
-        if errors.is_empty() {
-            Ok(self.node(&value))
-        } else {
-            Err(errors.iter().map(|error| self.syntax_error(error)).collect())
-        }
+        if errors.is_empty() { Ok(self.node(&value)) } else { Err(self.syntax_errors(&errors)) }
     }
 
-    fn syntax_error(&self, error: &toml::de::Error) -> Error {
-        let span = error.span().unwrap_or(self.text.len()..self.text.len());
-        Error::Syntax { message: error.message().into(), place: self.place(span) }
+    /// The errors of the parser without those that follow from others: of a line only the first, and none after a
+    /// list or table that is not closed. A key given twice confuses nothing and is always told.
+    fn syntax_errors(&self, errors: &[toml::de::Error]) -> Vec<Error> {
+        let mut errors: Vec<_> = errors
+            .iter()
+            .map(|error| (error.message(), self.place(error.span().unwrap_or(self.text.len()..self.text.len()))))
+            .collect();
+        errors.sort_by_key(|(_, place)| (place.line, place.column));
+        let (mut last_line, mut open) = (0, false);
+        errors.retain(|(message, place)| {
+            let follows = *message != "duplicate key" && (open || place.line == last_line);
+            last_line = place.line;
+            open |= ["array", "key-value", "unclosed", "multi-line"].iter().any(|word| message.contains(word));
+            !follows
+        });
+        let syntax = |(message, place): (&str, Place)| Error::Syntax {
+            message: message.replace(", expected nothing", ""),
+            place,
+        };
+        errors.into_iter().map(syntax).collect()
     }
 
     fn node(&self, spanned: &Spanned<DeValue<'_>>) -> Node {
