@@ -79,7 +79,7 @@ impl References {
             let first = first_use("control", name, place, &mut seen, item.mistakes);
             let value = match node.value {
                 Value::Table(_) => control.table(|table| {
-                    let path = table.required("csv", "{ csv = \"curves.csv\" }", |item| self.file(&item))?;
+                    let path = table.required("csv", "csv = \"curves.csv\"", |item| self.file(&item))?;
                     known.and_then(|()| self.column(&path, name, &control)).map(|()| ControlValue::Csv(path))
                 }),
                 _ => control.number(ACTIVATION).map(ControlValue::Constant),
