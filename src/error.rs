@@ -3,18 +3,181 @@
 //! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
 //! `O` output. A code never changes its meaning; a retired code is not used again.
 
+use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// What went wrong, with its numbers, place and units.
+/// What went wrong, with its numbers, place and units. Below 128 bytes, since every `Result` carries it.
 ///
 /// `Display` gives the message (what, where, how much); [`Error::code`] the stable code, [`Error::help`] the
 /// edit or command that mends it, [`Error::exit_code`] what the process returns.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     // ---- C: problem file ------------------------------------------------------------------------------
+    /// Every mistake of a file at once, in the order of its lines.
+    #[error("{} mistakes:{}", .0.len(), .0.iter().map(one_line).collect::<String>())]
+    Mistakes(Vec<Error>),
+    /// The text cannot be read as TOML (or as UTF-8) at all.
+    #[error("the file is not valid TOML: {message}")]
+    Syntax {
+        /// What the parser met and what it expected.
+        message: String,
+        /// Where it met it.
+        place: Place,
+    },
+    /// A key that means nothing in its table.
+    #[error("unknown key `{key}` in {table}")]
+    UnknownKey {
+        /// The key as written.
+        key: Box<str>,
+        /// The table that holds it.
+        table: String,
+        /// The nearest known key, or all of them.
+        help: String,
+        /// The key.
+        place: Place,
+    },
+    /// A table lacks keys that have no default.
+    #[error("{table} lacks {keys}")]
+    MissingKey {
+        /// The table that should hold them.
+        table: String,
+        /// The missing keys, each in backticks.
+        keys: Box<str>,
+        /// What to add.
+        help: String,
+        /// The header of the table.
+        place: Place,
+    },
+    /// A value of the wrong kind, for example text where a number belongs.
+    #[error("`{key}` must be {expected}, but this is {found}")]
+    WrongType {
+        /// The key, as a path from the root of the file.
+        key: String,
+        /// What belongs there.
+        expected: String,
+        /// What stands there.
+        found: Box<str>,
+        /// The value.
+        place: Place,
+    },
+    /// A number outside what it may be.
+    #[error("`{key}` = {value} is not allowed: it must be {allowed}")]
+    OutOfRange {
+        /// The key, as a path from the root of the file.
+        key: String,
+        /// The value as written.
+        value: Box<str>,
+        /// The allowed range, in words.
+        allowed: String,
+        /// The value.
+        place: Place,
+    },
+    /// A word that is not among the words a key may hold.
+    #[error("`{key}` cannot be \"{value}\"")]
+    UnknownChoice {
+        /// The key, as a path from the root of the file.
+        key: String,
+        /// The word as written.
+        value: Box<str>,
+        /// The nearest allowed word, and all of them.
+        help: String,
+        /// The word.
+        place: Place,
+    },
+    /// A list with too few or too many entries.
+    #[error("`{key}` has {found}, but needs {expected}")]
+    WrongLength {
+        /// The key, as a path from the root of the file.
+        key: String,
+        /// How many there are, with what is counted.
+        found: Box<str>,
+        /// How many are needed, and why.
+        expected: String,
+        /// The list.
+        place: Place,
+    },
+    /// Two things of a kind share a name.
+    #[error("a second {kind} is called `{name}`: the first is in line {first_line}")]
+    DuplicateName {
+        /// What carries the name: `muscle`, `probe`, `marker`, `column`.
+        kind: &'static str,
+        /// The shared name.
+        name: String,
+        /// The line (from 1) that used it first.
+        first_line: u32,
+        /// The second use.
+        place: Place,
+    },
+    /// A name that refers to nothing.
+    #[error("no {kind} is called `{name}`")]
+    UnknownName {
+        /// What should carry the name: `muscle`, `column`.
+        kind: &'static str,
+        /// The name as written.
+        name: String,
+        /// The nearest name, or all of them.
+        help: String,
+        /// The name.
+        place: Place,
+    },
+    /// Something that is planned, and that this version cannot do.
+    #[error("`{key}` ({what}) is not in this version of risorius")]
+    NotInThisVersion {
+        /// The key or word.
+        key: String,
+        /// What it will do.
+        what: &'static str,
+        /// What can be used today.
+        instead: String,
+        /// The key or word.
+        place: Place,
+    },
+    /// A table that must hold exactly one of several keys holds none or more than one.
+    #[error("{table} must hold exactly one of {choices}, but holds {found}")]
+    NotExactlyOne {
+        /// The table.
+        table: String,
+        /// The keys to choose from.
+        choices: String,
+        /// The chosen ones, or `none`.
+        found: Box<str>,
+        /// The header of the table.
+        place: Place,
+    },
+    /// A file that the problem names does not exist.
+    #[error("`{key}` names a file that does not exist: {}", path.display())]
+    MissingFile {
+        /// The key, as a path from the root of the file.
+        key: String,
+        /// The full path that was tried.
+        path: PathBuf,
+        /// The path as written.
+        place: Place,
+    },
+    /// A `--set key=value` that cannot be applied to the problem.
+    #[error("{message}")]
+    BadOverride {
+        /// What stands in the way.
+        message: String,
+        /// A form that would do.
+        help: String,
+        /// The part of the argument that is at fault.
+        place: Place,
+    },
+    /// Times of a table of curves do not increase.
+    #[error("time {time_s} s follows {previous_s} s: times must increase from row to row")]
+    TimeOrder {
+        /// The time of this row, s.
+        time_s: f64,
+        /// The time of the row before, s.
+        previous_s: f64,
+        /// The time of this row.
+        place: Place,
+    },
     // ---- M: recording ---------------------------------------------------------------------------------
     // ---- K: markers against the model -----------------------------------------------------------------
     // ---- G: geometry ----------------------------------------------------------------------------------
@@ -89,9 +252,37 @@ pub enum Error {
 }
 
 impl Error {
+    /// One error for a list of mistakes: the mistake itself if there is one, otherwise [`Error::Mistakes`].
+    pub fn all(mut mistakes: Vec<Error>) -> Error {
+        if mistakes.len() == 1 { mistakes.remove(0) } else { Error::Mistakes(mistakes) }
+    }
+
+    /// The single mistakes: those of [`Error::Mistakes`], or this error alone.
+    pub fn mistakes(&self) -> &[Error] {
+        match self {
+            Error::Mistakes(mistakes) => mistakes,
+            _ => std::slice::from_ref(self),
+        }
+    }
+
     /// The stable code, for example `S003`.
     pub fn code(&self) -> &'static str {
         match self {
+            Error::Mistakes(_) => "C000",
+            Error::Syntax { .. } => "C001",
+            Error::UnknownKey { .. } => "C002",
+            Error::MissingKey { .. } => "C003",
+            Error::WrongType { .. } => "C004",
+            Error::OutOfRange { .. } => "C005",
+            Error::UnknownChoice { .. } => "C006",
+            Error::WrongLength { .. } => "C007",
+            Error::DuplicateName { .. } => "C008",
+            Error::UnknownName { .. } => "C009",
+            Error::NotInThisVersion { .. } => "C010",
+            Error::NotExactlyOne { .. } => "C011",
+            Error::MissingFile { .. } => "C012",
+            Error::BadOverride { .. } => "C013",
+            Error::TimeOrder { .. } => "C014",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
@@ -105,6 +296,20 @@ impl Error {
     /// The edit or command that mends it, where one is known.
     pub fn help(&self) -> Option<String> {
         match self {
+            Error::Mistakes(_) | Error::OutOfRange { .. } | Error::WrongLength { .. } => None,
+            Error::Syntax { message, .. } => syntax_help(message),
+            Error::UnknownKey { help, .. }
+            | Error::MissingKey { help, .. }
+            | Error::UnknownChoice { help, .. }
+            | Error::UnknownName { help, .. }
+            | Error::BadOverride { help, .. } => Some(help.clone()),
+            Error::WrongType { expected, found, key, .. } => wrong_type_help(key, expected, found),
+            Error::DuplicateName { kind, .. } => Some(format!("give every {kind} its own name")),
+            Error::NotInThisVersion { instead, .. } => Some(instead.clone()),
+            Error::NotExactlyOne { found, .. } if &**found == "none" => Some("add the one you mean".into()),
+            Error::NotExactlyOne { .. } => Some("keep one; write a table of its own for every other".into()),
+            Error::MissingFile { .. } => Some("a relative path starts at the folder of the problem file".into()),
+            Error::TimeOrder { .. } => Some("sort the rows by time, and keep one row per time".into()),
             Error::NotFinite => None,
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
@@ -123,6 +328,27 @@ impl Error {
         }
     }
 
+    /// The place in a text that caused it, where there is one.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Error::Syntax { place, .. }
+            | Error::UnknownKey { place, .. }
+            | Error::MissingKey { place, .. }
+            | Error::WrongType { place, .. }
+            | Error::OutOfRange { place, .. }
+            | Error::UnknownChoice { place, .. }
+            | Error::WrongLength { place, .. }
+            | Error::DuplicateName { place, .. }
+            | Error::UnknownName { place, .. }
+            | Error::NotInThisVersion { place, .. }
+            | Error::NotExactlyOne { place, .. }
+            | Error::MissingFile { place, .. }
+            | Error::BadOverride { place, .. }
+            | Error::TimeOrder { place, .. } => Some(place),
+            Error::Mistakes(_) | Error::NotFinite | Error::Io { .. } => None,
+        }
+    }
+
     /// The exit code of the process: 3 invalid input, 4 not converged, 6 input or output failed.
     pub fn exit_code(&self) -> u8 {
         match self.code().as_bytes()[0] {
@@ -131,4 +357,114 @@ impl Error {
             _ => 3,
         }
     }
+}
+
+/// A mistake as a line of a list.
+fn one_line(mistake: &Error) -> String {
+    let place = mistake.place().map(|place| format!("{place}: ")).unwrap_or_default();
+    format!("\n  {place}{} {mistake}", mistake.code())
+}
+
+/// The remedy for the classic slips of TOML.
+fn syntax_help(message: &str) -> Option<String> {
+    const REMEDIES: [(&str, &str); 8] = [
+        ("duplicate key", "keep one of the two; a table that may come several times is written [[name]]"),
+        ("must be quoted", "write text in quotes: \"...\""),
+        ("invalid boolean", "write text in quotes: \"...\""),
+        ("string, expected `\"`", "the quote that ends the text is missing"),
+        ("unclosed table", "close the header with ]"),
+        ("unquoted key", "put a key with other characters in quotes: \"...\" = "),
+        ("missing comma", "look for a comma, bracket or brace that is missing just before"),
+        ("array", "look for a comma or bracket that is missing here or in a line before"),
+    ];
+    REMEDIES.iter().find(|(words, _)| message.contains(words)).map(|(_, remedy)| remedy.to_string())
+}
+
+/// The remedy for the classic confusions between kinds of value.
+fn wrong_type_help(key: &str, expected: &str, found: &str) -> Option<String> {
+    let quoted = found.strip_prefix("text \"").and_then(|text| text.strip_suffix('"'));
+    let quoted_number = quoted.is_some_and(|text| text.trim().parse::<f64>().is_ok());
+    if expected.ends_with("number") && quoted_number {
+        Some("write the number without quotes".into())
+    } else if expected.starts_with("text") && !found.starts_with("text") {
+        Some("write it in quotes".into())
+    } else if expected == "a list of tables" && found == "a table" {
+        Some(format!("write its header in double brackets: [[{key}]]"))
+    } else if expected == "a table" && found == "a list of tables" {
+        Some(format!("there is only one of it: write its header in single brackets, [{key}]"))
+    } else {
+        None
+    }
+}
+
+/// A place in a text that was read: what a message points at.
+///
+/// Everything built from a problem file keeps the place it came from, so that a mistake found much later (a muscle
+/// outside its host) can still show the line to edit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// The file as the user named it, or `command line`.
+    pub file: Arc<str>,
+    /// The whole line, without its end.
+    pub text: Arc<str>,
+    /// The line, counted from 1; 0 means the file as a whole.
+    pub line: u32,
+    /// The column of the first character, counted from 1 in characters.
+    pub column: u32,
+    /// The number of characters meant, at least 1.
+    pub length: u32,
+}
+
+impl Place {
+    /// A file as a whole: something is missing from it.
+    pub fn whole(file: &str) -> Place {
+        Place { file: file.into(), text: "".into(), line: 0, column: 0, length: 1 }
+    }
+
+    /// The bytes `span` of the line `text`, which is number `line` (from 1) of `file`. A span that leaves the line,
+    /// or that cuts a character, is narrowed to the line.
+    pub fn on_line(file: &Arc<str>, line: usize, text: &str, span: Range<usize>) -> Place {
+        let start = text.floor_char_boundary(span.start);
+        let end = text.floor_char_boundary(span.end).max(start);
+        let count = |part: &str| u32::try_from(part.chars().count()).unwrap_or(u32::MAX);
+        Place {
+            file: Arc::clone(file),
+            line: u32::try_from(line).unwrap_or(u32::MAX),
+            column: count(&text[..start]).saturating_add(1),
+            length: count(&text[start..end]).max(1),
+            text: text.into(),
+        }
+    }
+
+    /// From the start of this place to the end of `other`, if that is on the same line; otherwise `other`.
+    pub fn until(&self, other: &Place) -> Place {
+        if (&self.file, self.line) != (&other.file, other.line) || other.column < self.column {
+            return other.clone();
+        }
+        Place { length: other.column - self.column + other.length, ..self.clone() }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            0 => write!(out, "{}", self.file),
+            line => write!(out, "{}:{line}:{}", self.file, self.column),
+        }
+    }
+}
+
+/// Something that does not stop a run, and that its reader must know. Under `--strict` it ends the run.
+///
+/// Codes share the letters and the numbers of [`Error::code`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// The stable code.
+    pub code: &'static str,
+    /// What was noticed, with its number and unit.
+    pub message: String,
+    /// Where, if it comes from a text.
+    pub place: Option<Place>,
+    /// What to do about it, where something is to be done.
+    pub help: Option<String>,
 }

@@ -1,0 +1,3 @@
+//! What a user types and sees. Prints, never computes.
+
+pub mod diagnostics;

@@ -1,0 +1,315 @@
+//! From a tree to a scene: which keys there are, what each may hold, and what stands for it when it is absent.
+
+use super::Scene;
+use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
+use super::references::References;
+use super::spec::*;
+use super::tree::Node;
+
+/// The scene of a whole file; `None` if there is any mistake in a value.
+pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: &Mistakes) -> Option<Scene> {
+    Item { node: root, path: String::new(), mistakes }.table(|file| {
+        let name = file.or("name", name.to_string(), |item| item.name());
+        let task = file.required("task", "[task]\nkind = \"forward\"", |item| item.table(task));
+        let fitting = task == Some(Task::Fit);
+        let mesh = file.required(
+            "mesh",
+            "[mesh]\nblock = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }",
+            |item| item.table(mesh),
+        );
+        let tissue = file.required("tissue", "[tissue]\nmooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", |item| {
+            item.table(tissue)
+        });
+        let muscles = file.tables("muscle", muscle);
+        let supports = file.tables("support", support);
+        let loads = file.tables("load", load);
+        let controls = file.or("controls", Vec::new(), |item| references.controls(&item));
+        let probes = file.tables("probe", probe);
+        let fit = if fitting {
+            file.required("fit", "[fit]\nmarkers = \"recording.mcap\"\nunits = \"m\"", |item| {
+                item.table(|table| fit(table, references)).map(Some)
+            })
+        } else {
+            file.optional("fit", |item| item.table(|table| fit(table, references)))
+        };
+        let markers = file.tables("marker", marker);
+        if fitting {
+            file.must_hold("marker", "[[marker]]\nname = \"M01\"\nposition_mm = [30, 10, 20]");
+            file.must_hold("muscle", "[[muscle]]\nname = \"slab\"\n...");
+        }
+        let solver = file.or("solver", SolverSpec::default(), |item| item.table(solver));
+        let output = file.or("output", OutputSpec::default(), |item| item.table(output));
+        let scene = Scene {
+            name: name?,
+            folder: references.folder().to_path_buf(),
+            task: task?,
+            mesh: mesh?,
+            tissue: tissue?,
+            muscles: muscles?,
+            supports: supports?,
+            loads: loads?,
+            controls: controls?,
+            probes: probes?,
+            fit: fit?,
+            markers: markers?,
+            solver: solver?,
+            output: output?,
+            warnings: Vec::new(),
+        };
+        Some(scene)
+    })
+}
+
+impl Default for SolverSpec {
+    fn default() -> Self {
+        SolverSpec { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+    }
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        OutputSpec { view: true, every: 1 }
+    }
+}
+
+impl Default for FramesSpec {
+    fn default() -> Self {
+        FramesSpec { first: 0, last: None, step: 1 }
+    }
+}
+
+fn task(table: &mut Table) -> Option<Task> {
+    let kinds = [("forward", Task::Forward), ("fit", Task::Fit)];
+    let later = [("fibres", "fits fibre angles to measured directions"), ("study", "error against time")];
+    table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &later))
+}
+
+fn block(table: &mut Table) -> Option<BlockSpec> {
+    let origin_mm = table.required("origin_mm", "origin_mm = [0, 0, 0]", |item| item.numbers(FINITE));
+    let size_mm = table.required("size_mm", "size_mm = [60, 20, 20]", |item| item.numbers(POSITIVE));
+    let elements = table.required("elements", "elements = [6, 2, 2]", |item| {
+        item.triple("a list of 3 whole numbers", |item| item.whole(1, 1000))
+    });
+    Some(BlockSpec { origin_mm: origin_mm?, size_mm: size_mm?, elements: elements? })
+}
+
+fn mesh(table: &mut Table) -> Option<MeshSpec> {
+    let example = "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
+    let block = table.required("block", example, |item| item.table(block));
+    table.later("exf", "a mesh from an EXF file", "block");
+    table.later("field", "a field of an EXF file", "block");
+    Some(MeshSpec { block: block?, place: table.place() })
+}
+
+fn tissue(table: &mut Table) -> Option<TissueSpec> {
+    let law = table.required("mooney-rivlin", "mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", |item| {
+        item.table(mooney_rivlin)
+    });
+    let pressures =
+        [("trilinear", PressureSpec::Trilinear), ("discontinuous-trilinear", PressureSpec::DiscontinuousTrilinear)];
+    let later = [("discontinuous-linear", "four pressures per element"), ("constant", "one pressure per element")];
+    let pressure = table.or("pressure", PressureSpec::Trilinear, |item| item.choice(&pressures, &later));
+    let kappa_kpa = table.or("kappa_kpa", 10.0, |item| item.number(NOT_NEGATIVE));
+    let gauss = table.or("gauss", 5, |item| item.whole(3, 8));
+    Some(TissueSpec { law: law?, pressure: pressure?, kappa_kpa: kappa_kpa?, gauss: gauss?, place: table.place() })
+}
+
+fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
+    let c1_kpa = table.required("c1_kpa", "c1_kpa = 0.5", |item| item.number(NOT_NEGATIVE));
+    let c2_kpa = table.required("c2_kpa", "c2_kpa = 0.2", |item| item.number(NOT_NEGATIVE));
+    let (c1_kpa, c2_kpa) = (c1_kpa?, c2_kpa?);
+    if c1_kpa + c2_kpa == 0.0 {
+        return table.contradiction("c1_kpa", "c2_kpa", c1_kpa, "greater than 0 where c2_kpa is 0");
+    }
+    Some(LawSpec::MooneyRivlin { c1_kpa, c2_kpa })
+}
+
+fn muscle(table: &mut Table) -> Option<MuscleSpec> {
+    let name = table.required("name", "name = \"slab\"", |item| item.name());
+    let block = table.required(
+        "block",
+        "block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }",
+        |item| item.table(block),
+    );
+    table.later("exf", "a muscle mesh from an EXF file", "block");
+    let later = [("hermite", "tricubic Hermite muscles")];
+    let element = table
+        .or("element", ElementSpec::Trilinear, |item| item.choice(&[("trilinear", ElementSpec::Trilinear)], &later));
+    let fibres = fibres(table, block.as_ref());
+    let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
+    let example = "blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }";
+    let blemker = table.required("blemker", example, |item| item.table(blemker));
+    Some(MuscleSpec {
+        name: name?,
+        block: block?,
+        element: element?,
+        fibres: fibres?,
+        gauss: gauss?,
+        blemker: blemker?,
+        place: table.place(),
+    })
+}
+
+/// Angles everywhere or at the nodes; a list at the nodes must have one entry for each.
+fn fibres(table: &mut Table, block: Option<&BlockSpec>) -> Option<FibresSpec> {
+    let uniform = table.item("fibre_angles_deg").map(|item| item.numbers(FINITE));
+    let nodes = table.item("fibre_angles_nodes_deg").map(|item| {
+        let angles = item.list("a list with the 3 angles of every node", |node| node.numbers(FINITE))?;
+        match block.map(BlockSpec::nodes) {
+            Some(nodes) if nodes != angles.len() => item.wrong_length(
+                &format!("angles for {} nodes", angles.len()),
+                &format!("{nodes}, one triple per node of the block, x fastest"),
+            ),
+            _ => Some(angles),
+        }
+    });
+    table.later("angles_field", "fibre angles from an EXF file", "fibre_angles_deg");
+    match (uniform, nodes) {
+        (Some(uniform), None) => uniform.map(FibresSpec::Uniform),
+        (None, Some(nodes)) => nodes.map(FibresSpec::Nodes),
+        (None, None) => table.required("fibre_angles_deg", "fibre_angles_deg = [36, 0, 0]", |_| None),
+        (Some(_), Some(_)) => table.not_exactly_one(
+            &["fibre_angles_deg", "fibre_angles_nodes_deg"],
+            &["fibre_angles_deg", "fibre_angles_nodes_deg"],
+        ),
+    }
+}
+
+fn blemker(table: &mut Table) -> Option<BlemkerSpec> {
+    let sigma_max_kpa = table.required("sigma_max_kpa", "sigma_max_kpa = 300", |item| item.number(POSITIVE));
+    let lambda_star = table.required("lambda_star", "lambda_star = 1.4", |item| item.number(POSITIVE));
+    let lambda_ofl = table.required("lambda_ofl", "lambda_ofl = 1.0", |item| item.number(POSITIVE));
+    let p1 = table.required("p1", "p1 = 0.005", |item| item.number(NOT_NEGATIVE));
+    let p2 = table.required("p2", "p2 = 6.6", |item| item.number(POSITIVE));
+    let (lambda_star, lambda_ofl) = (lambda_star?, lambda_ofl?);
+    if lambda_star <= lambda_ofl {
+        let allowed = format!("greater than lambda_ofl = {lambda_ofl:?}");
+        return table.contradiction("lambda_star", "lambda_ofl", lambda_star, &allowed);
+    }
+    Some(BlemkerSpec { sigma_max_kpa: sigma_max_kpa?, lambda_star, lambda_ofl, p1: p1?, p2: p2? })
+}
+
+fn support(table: &mut Table) -> Option<SupportSpec> {
+    let clamp: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Clamp { face: face(table)? }));
+    let symmetry: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Symmetry { face: face(table)? }));
+    let kind = table.one_of(&[("clamp", clamp), ("symmetry", symmetry), ("rotate", |item| item.table(rotate))]);
+    Some(SupportSpec { kind: kind?, place: table.place() })
+}
+
+fn rotate(table: &mut Table) -> Option<SupportKind> {
+    let face = face(table);
+    let axis = table.required("axis", "axis = [1, 0, 0]", |item| match item.numbers(FINITE)? {
+        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
+        axis => Some(axis),
+    });
+    let through_mm = table.required("through_mm", "through_mm = [0, 5, 5]", |item| item.numbers(FINITE));
+    let angle_deg = table.required("angle_deg", "angle_deg = 90", |item| item.number(FINITE));
+    Some(SupportKind::Rotate { face: face?, axis: axis?, through_mm: through_mm?, angle_deg: angle_deg? })
+}
+
+/// A side of the block: `"xi1=0"` to `"xi3=1"`.
+fn face(table: &mut Table) -> Option<FaceSpec> {
+    let sides = [0, 1, 2].iter().flat_map(|&direction| [0, 1].map(|end| FaceSpec::BlockSide { direction, end }));
+    let sides: Vec<(String, FaceSpec)> = sides.map(|side| (side.to_string(), side)).collect();
+    let words: Vec<(&str, FaceSpec)> = sides.iter().map(|(word, side)| (word.as_str(), *side)).collect();
+    table.required("face", "face = \"xi1=0\"", |item| item.choice(&words, &[]))
+}
+
+fn load(table: &mut Table) -> Option<LoadSpec> {
+    let traction: Reader<LoadKind> = |item| item.table(traction);
+    let kind = table.one_of(&[("traction", traction), ("gravity", |item| item.table(gravity))]);
+    Some(LoadSpec { kind: kind?, place: table.place() })
+}
+
+fn traction(table: &mut Table) -> Option<LoadKind> {
+    let face = face(table);
+    let kpa = table.required("kpa", "kpa = [0, 0, -0.04]", |item| item.numbers(FINITE));
+    Some(LoadKind::Traction { face: face?, kpa: kpa? })
+}
+
+fn gravity(table: &mut Table) -> Option<LoadKind> {
+    let density = table.required("density_kg_m3", "density_kg_m3 = 1040", |item| item.number(POSITIVE));
+    let acceleration =
+        table.required("acceleration_m_s2", "acceleration_m_s2 = [0, 0, -9.81]", |item| item.numbers(FINITE));
+    Some(LoadKind::Gravity { density_kg_m3: density?, acceleration_m_s2: acceleration? })
+}
+
+fn probe(table: &mut Table) -> Option<ProbeSpec> {
+    let name = table.required("name", "name = \"tip\"", |item| item.name());
+    let position_mm = table.required("position_mm", "position_mm = [60, 20, 20]", |item| item.numbers(FINITE));
+    Some(ProbeSpec { name: name?, position_mm: position_mm?, place: table.place() })
+}
+
+fn marker(table: &mut Table) -> Option<MarkerSpec> {
+    let name = table.required("name", "name = \"M01\"", |item| item.name());
+    let position_mm = table.required("position_mm", "position_mm = [30, 10, 20]", |item| item.numbers(FINITE));
+    let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
+    Some(MarkerSpec { name: name?, position_mm: position_mm?, sd_mm: sd_mm?, place: table.place() })
+}
+
+fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
+    let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
+    let units = [("mm", Units::Mm), ("cm", Units::Cm), ("m", Units::M)];
+    let units = table.required("units", "units = \"m\"", |item| item.choice(&units, &[]));
+    let topic = table.optional("topic", |item| item.name());
+    let sensitivities =
+        [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
+    let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
+    let unknowns = table.or("unknowns", references.muscles(), |item| references.unknowns(&item));
+    let zero_is_missing = table.or("zero_is_missing", true, |item| item.flag());
+    let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
+    let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
+    let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
+    let tolerance = table.or("tolerance", 1e-8, |item| item.number(PART));
+    let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
+    let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
+    Some(FitSpec {
+        markers: markers?,
+        units: units?,
+        topic: topic?,
+        sensitivity: sensitivity?,
+        unknowns: unknowns?,
+        zero_is_missing: zero_is_missing?,
+        sd_mm: sd_mm?,
+        max_marker_distance_mm: max_marker_distance_mm?,
+        frames: frames?,
+        tolerance: tolerance?,
+        max_iterations: max_iterations?,
+        finite_difference_step: finite_difference_step?,
+        place: table.place(),
+    })
+}
+
+fn frames(table: &mut Table) -> Option<FramesSpec> {
+    const MOST: usize = 1_000_000_000;
+    let first = table.or("first", 0, |item| item.whole(0, MOST));
+    let last = table.optional("last", |item| item.whole(0, MOST));
+    let step = table.or("step", 1, |item| item.whole(1, MOST));
+    let (first, last) = (first?, last?);
+    match last {
+        Some(last) if last < first => {
+            table.contradiction("last", "first", last as f64, &format!("at least first = {first}"))
+        }
+        _ => Some(FramesSpec { first, last, step: step? }),
+    }
+}
+
+fn solver(table: &mut Table) -> Option<SolverSpec> {
+    let default = SolverSpec::default();
+    let tolerance = table.or("tolerance", default.tolerance, |item| item.number(PART));
+    let max_iterations = table.or("max_iterations", default.max_iterations, |item| item.whole(1, 10_000));
+    let step_max = table.or("step_max", default.step_max, |item| item.number(PART));
+    let step_min = table.or("step_min", default.step_min, |item| item.number(PART));
+    let (step_max, step_min) = (step_max?, step_min?);
+    if step_min > step_max {
+        return table.contradiction("step_min", "step_max", step_min, &format!("at most step_max = {step_max:?}"));
+    }
+    Some(SolverSpec { tolerance: tolerance?, max_iterations: max_iterations?, step_max, step_min })
+}
+
+fn output(table: &mut Table) -> Option<OutputSpec> {
+    let default = OutputSpec::default();
+    let view = table.or("view", default.view, |item| item.flag());
+    let every = table.or("every", default.every, |item| item.whole(1, 1_000_000));
+    Some(OutputSpec { view: view?, every: every? })
+}

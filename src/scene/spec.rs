@@ -1,0 +1,373 @@
+//! What a problem file says, as plain checked data.
+//!
+//! Every number here is finite and within its range, every name that refers to a muscle refers to one, every path is
+//! absolute. What needs geometry (is the muscle inside its host?) is asked later, and points back through `place`.
+
+use crate::error::Place;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What to do with the problem: `[task] kind`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Task {
+    /// Given loads and activations, find the shape.
+    Forward,
+    /// Given marker positions, find the activations.
+    Fit,
+}
+
+/// The host body: `[mesh]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct MeshSpec {
+    /// A box of tricubic Hermite elements.
+    pub block: BlockSpec,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A box along the axes, cut into equal elements; xi1, xi2, xi3 run along x, y, z.
+#[derive(Debug, Clone, Serialize)]
+pub struct BlockSpec {
+    /// The corner with the smallest coordinates, mm.
+    pub origin_mm: [f64; 3],
+    /// The lengths of the edges, mm; greater than 0.
+    pub size_mm: [f64; 3],
+    /// The number of elements along each edge, at least 1.
+    pub elements: [usize; 3],
+}
+
+impl BlockSpec {
+    /// The number of nodes of a mesh with one node per element corner.
+    pub fn nodes(&self) -> usize {
+        self.elements.iter().map(|elements| elements + 1).product()
+    }
+}
+
+/// The passive tissue of the host: `[tissue]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct TissueSpec {
+    /// The material law.
+    pub law: LawSpec,
+    /// The space of the pressure that keeps the volume.
+    pub pressure: PressureSpec,
+    /// The modulus of the volume energy beside the pressure, kPa; 0 leaves it out.
+    pub kappa_kpa: f64,
+    /// Gauss points per direction and element, 3 to 8.
+    pub gauss: usize,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A material law with its constants.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LawSpec {
+    /// psi = c1 (I1 - 3) + c2 (I2 - 3), invariants of the isochoric part.
+    MooneyRivlin {
+        /// c1, kPa, not negative; c1 + c2 is positive.
+        c1_kpa: f64,
+        /// c2, kPa, not negative.
+        c2_kpa: f64,
+    },
+}
+
+/// A space of pressures: `[tissue] pressure`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PressureSpec {
+    /// One value per element corner, continuous from element to element.
+    Trilinear,
+    /// Eight values per element, independent of its neighbours.
+    DiscontinuousTrilinear,
+}
+
+/// A muscle embedded in the host: `[[muscle]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct MuscleSpec {
+    /// Its name, unique among muscles; its control carries the same name.
+    pub name: String,
+    /// Where the muscle lies before anything moves.
+    pub block: BlockSpec,
+    /// The elements of the muscle's own mesh.
+    pub element: ElementSpec,
+    /// The direction of its fibres.
+    pub fibres: FibresSpec,
+    /// Gauss points per direction and muscle element, 1 to 8.
+    pub gauss: usize,
+    /// The constants of its force-stretch law.
+    pub blemker: BlemkerSpec,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// The elements of a muscle mesh: `[[muscle]] element`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ElementSpec {
+    /// Eight corners, trilinear between them.
+    Trilinear,
+}
+
+/// Fibre, imbrication and sheet angle, degrees, relative to the axes of the muscle elements.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FibresSpec {
+    /// `fibre_angles_deg`: the same angles everywhere.
+    Uniform([f64; 3]),
+    /// `fibre_angles_nodes_deg`: angles at the nodes of the block, x fastest, then y, then z.
+    Nodes(Vec<[f64; 3]>),
+}
+
+/// The constants of the fibre law of Blemker et al. 2005.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct BlemkerSpec {
+    /// The greatest isometric stress, kPa.
+    pub sigma_max_kpa: f64,
+    /// The stretch at which the passive force becomes linear; greater than `lambda_ofl`.
+    pub lambda_star: f64,
+    /// The stretch of optimal fibre length.
+    pub lambda_ofl: f64,
+    /// The factor of the passive exponential.
+    pub p1: f64,
+    /// The rate of the passive exponential.
+    pub p2: f64,
+}
+
+/// Something that holds or moves a part of the surface: `[[support]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct SupportSpec {
+    /// What it does.
+    pub kind: SupportKind,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// The kinds of support.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SupportKind {
+    /// The face does not move.
+    Clamp {
+        /// The face.
+        face: FaceSpec,
+    },
+    /// The face does not move along its normal.
+    Symmetry {
+        /// The face.
+        face: FaceSpec,
+    },
+    /// The face turns as a rigid plate.
+    Rotate {
+        /// The face.
+        face: FaceSpec,
+        /// The axis of rotation; any length but 0.
+        axis: [f64; 3],
+        /// A point of the axis, mm.
+        through_mm: [f64; 3],
+        /// The angle at full load, degrees, by the right-hand rule.
+        angle_deg: f64,
+    },
+}
+
+/// A part of the host's surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FaceSpec {
+    /// A whole side of a block: `"xi1=0"` is direction 0, end 0.
+    BlockSide {
+        /// 0, 1, 2 for xi1, xi2, xi3.
+        direction: usize,
+        /// 0 or 1: where that coordinate is smallest or greatest.
+        end: usize,
+    },
+}
+
+impl std::fmt::Display for FaceSpec {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let FaceSpec::BlockSide { direction, end } = self;
+        write!(out, "xi{}={end}", direction + 1)
+    }
+}
+
+/// A force on the body: `[[load]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct LoadSpec {
+    /// What it is.
+    pub kind: LoadKind,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// The kinds of load.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoadKind {
+    /// A dead force per reference area of a face.
+    Traction {
+        /// The face.
+        face: FaceSpec,
+        /// Force per reference area, kPa, in fixed directions.
+        kpa: [f64; 3],
+    },
+    /// The weight of the tissue.
+    Gravity {
+        /// Density, kg/m3.
+        density_kg_m3: f64,
+        /// Acceleration, m/s2.
+        acceleration_m_s2: [f64; 3],
+    },
+}
+
+/// The activation of a muscle: one line of `[controls]`. A muscle without one rests at 0.
+///
+/// In a fit, the control of a muscle that is not among the unknowns holds; that of an unknown is found, not read.
+#[derive(Debug, Clone, Serialize)]
+pub struct ControlSpec {
+    /// The muscle.
+    pub name: String,
+    /// How much.
+    pub value: ControlValue,
+    /// The line in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// An activation, from 0 (at rest) to 1 (all it can).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ControlValue {
+    /// The same at all times.
+    Constant(f64),
+    /// The column with the name of the muscle in a table over time, see [`Curves`](super::Curves).
+    Csv(PathBuf),
+}
+
+/// A material point whose motion is written to a table: `[[probe]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct ProbeSpec {
+    /// Its name, unique among probes.
+    pub name: String,
+    /// Where it is before anything moves, mm.
+    pub position_mm: [f64; 3],
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A marker glued to the surface: `[[marker]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct MarkerSpec {
+    /// Its label in the recording, unique among markers.
+    pub name: String,
+    /// Where it is before anything moves, mm.
+    pub position_mm: [f64; 3],
+    /// The standard deviation of its measurement, mm, if it differs from that of the fit.
+    pub sd_mm: Option<f64>,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// How activations are found from markers: `[fit]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitSpec {
+    /// The recording.
+    pub markers: PathBuf,
+    /// The unit of length in the recording.
+    pub units: Units,
+    /// The topic of the markers, where the recording has several.
+    pub topic: Option<String>,
+    /// How the derivative of marker positions by activations is found.
+    pub sensitivity: SensitivitySpec,
+    /// The muscles whose activation is sought, in the order of the file; by default all of them.
+    pub unknowns: Vec<String>,
+    /// Whether a sample at exactly (0, 0, 0) is a lost marker.
+    pub zero_is_missing: bool,
+    /// The standard deviation of the measurement per coordinate, mm, if it is known.
+    pub sd_mm: Option<f64>,
+    /// A marker further than this from the surface of the model is a mistake, mm.
+    pub max_marker_distance_mm: f64,
+    /// Which frames of the recording are fitted.
+    pub frames: FramesSpec,
+    /// The change of the activations at which the search ends.
+    pub tolerance: f64,
+    /// The most Gauss-Newton steps per frame.
+    pub max_iterations: usize,
+    /// The step of finite differences in activation.
+    pub finite_difference_step: f64,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A unit of length: `[fit] units`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Units {
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
+
+impl Units {
+    /// The unit in millimetres.
+    pub fn in_mm(self) -> f64 {
+        match self {
+            Units::Mm => 1.0,
+            Units::Cm => 10.0,
+            Units::M => 1000.0,
+        }
+    }
+}
+
+/// How the derivative of the shape by the activations is found: `[fit] sensitivity`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensitivitySpec {
+    /// From the tangent at equilibrium (implicit function theorem).
+    Tangent,
+    /// From whole solves at activations a little apart.
+    FiniteDifference,
+}
+
+/// Frames `first`, `first + step`, ... up to and including `last` (or the end of the recording); counted from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct FramesSpec {
+    /// The first frame.
+    pub first: usize,
+    /// The last frame, not before the first.
+    pub last: Option<usize>,
+    /// The distance between frames, at least 1.
+    pub step: usize,
+}
+
+/// How equilibrium is found: `[solver]`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SolverSpec {
+    /// The relative residual at which a state counts as equilibrium.
+    pub tolerance: f64,
+    /// The most Newton iterations of one solve.
+    pub max_iterations: usize,
+    /// The greatest part of the load path taken at once; 1 is the whole path.
+    pub step_max: f64,
+    /// The smallest part of the load path before the solver gives up; not above `step_max`.
+    pub step_min: f64,
+}
+
+/// What is written beside the tables: `[output]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct OutputSpec {
+    /// Whether the folder `view` with the shapes is written.
+    pub view: bool,
+    /// Every how many frames a shape is written, at least 1.
+    pub every: usize,
+}

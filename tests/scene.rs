@@ -1,0 +1,472 @@
+//! Does a problem file mean what it says, and is every mistake in it told with its place and remedy?
+
+use proptest::prelude::*;
+use risorius::cli::diagnostics::{render_error, render_warning};
+use risorius::scene::{
+    ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, Scene, SupportKind, Task, Units,
+};
+use risorius::{Error, Result};
+use std::path::Path;
+
+/// Every table and nearly every key there is.
+const WHOLE: &str = r#"
+[task]
+kind = "fit"
+
+[mesh]
+block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
+
+[tissue]
+mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
+pressure = "trilinear"
+kappa_kpa = 10.0
+gauss = 5
+
+[[muscle]]
+name = "slab"
+block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
+fibre_angles_deg = [36, 0, 0]
+gauss = 3
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+
+[[muscle]]
+name = "risorius.L"
+block = { origin_mm = [4.5, 2.0, 4], size_mm = [50, 16, 4], elements = [1, 1, 1] }
+fibre_angles_nodes_deg = [[1,0,0], [2,0,0], [3,0,0], [4,0,0], [5,0,0], [6,0,0], [7,0,0], [8,0,0.5]]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+
+[[support]]
+clamp = { face = "xi1=0" }
+[[support]]
+symmetry = { face = "xi2=0" }
+[[support]]
+rotate = { face = "xi1=1", axis = [1, 0, 0], through_mm = [0, 5, 5], angle_deg = 90 }
+
+[[load]]
+traction = { face = "xi1=1", kpa = [0, 0, -0.04] }
+[[load]]
+gravity = { density_kg_m3 = 1040, acceleration_m_s2 = [0, 0, -9.81] }
+
+[controls]
+risorius.L = 0.05
+
+[[probe]]
+name = "tip"
+position_mm = [60, 20, 20]
+
+[fit]
+markers = "smile.mcap"
+units = "m"
+topic = "/markers"
+sensitivity = "finite-difference"
+unknowns = ["slab"]
+frames = { last = 9 }
+
+[[marker]]
+name = "M01"
+position_mm = [30, 10, 20]
+
+[solver]
+tolerance = 1e-8
+step_min = 1e-3
+"#;
+
+fn parse(text: &str, overrides: &[&str]) -> Result<Scene> {
+    let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
+    Scene::parse(text, "smile/problem.toml", Path::new("smile"), &overrides)
+}
+
+/// Everything in a scene but places, exact to the last bit.
+fn content(scene: &Scene) -> String {
+    serde_json::to_string(scene).unwrap()
+}
+
+#[test]
+fn a_whole_file_means_what_it_says() {
+    let scene = parse(WHOLE, &[]).unwrap();
+    assert_eq!((scene.name.as_str(), scene.task), ("smile", Task::Fit));
+    assert_eq!((scene.mesh.block.size_mm, scene.mesh.block.elements), ([60.0, 20.0, 20.0], [6, 2, 2]));
+    let LawSpec::MooneyRivlin { c1_kpa, c2_kpa } = scene.tissue.law;
+    assert_eq!((c1_kpa, c2_kpa, scene.tissue.kappa_kpa, scene.tissue.gauss), (0.5, 0.2, 10.0, 5));
+    assert_eq!(scene.muscles[0].fibres, FibresSpec::Uniform([36.0, 0.0, 0.0]));
+    assert!(matches!(&scene.muscles[1].fibres, FibresSpec::Nodes(nodes) if nodes[7] == [8.0, 0.0, 0.5]));
+    assert_eq!(scene.muscles[1].place.line, 21);
+    let face = FaceSpec::BlockSide { direction: 0, end: 1 };
+    assert!(matches!(scene.supports[2].kind, SupportKind::Rotate { face: f, angle_deg: 90.0, .. } if f == face));
+    assert!(matches!(scene.loads[0].kind, LoadKind::Traction { kpa: [0.0, 0.0, -0.04], .. }));
+    assert_eq!(scene.controls[0].name, "risorius.L");
+    assert_eq!(scene.controls[0].value, ControlValue::Constant(0.05));
+    assert_eq!((scene.controls[0].place.column, scene.controls[0].place.length), (1, 10));
+    let fit = scene.fit.as_ref().unwrap();
+    assert_eq!((fit.units, fit.unknowns.as_slice(), fit.frames.last), (Units::M, &["slab".to_string()][..], Some(9)));
+    assert!(fit.markers.is_absolute() && fit.markers.ends_with("smile/smile.mcap"));
+    assert_eq!((scene.solver.step_min, scene.solver.step_max), (1e-3, 1.0));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn numerics_have_defaults() {
+    let start = WHOLE.find("[task]").unwrap();
+    let end = WHOLE.find("pressure").unwrap();
+    let scene = parse(&WHOLE[start..end].replace("\"fit\"", "\"forward\""), &[]).unwrap();
+    assert_eq!((scene.tissue.kappa_kpa, scene.tissue.gauss), (10.0, 5));
+    assert_eq!((scene.solver.tolerance, scene.solver.max_iterations), (1e-8, 30));
+    assert!(scene.muscles.is_empty() && scene.fit.is_none() && scene.output.view);
+    // Nothing holds this body.
+    assert_eq!(scene.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>(), ["C016"]);
+    assert!(render_warning(&scene.warnings[0], false).starts_with("warn[C016]: nothing holds the body"));
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    text[..offset].matches('\n').count() + 1
+}
+
+/// The line of the whole file that holds `words`.
+fn line_with(words: &str) -> u32 {
+    line_of(WHOLE, WHOLE.find(words).unwrap()) as u32
+}
+
+/// Replaces `from` by `to` in the whole file and expects one mistake, at the text `at`.
+fn expect(from: &str, to: &str, code: &str, at: &str, told: &str) {
+    assert!(WHOLE.contains(from), "{from}");
+    let text = WHOLE.replacen(from, to, 1);
+    let error = parse(&text, &[]).expect_err(to);
+    let rendered = render_error(&error, false);
+    assert_eq!(error.mistakes().len(), 1, "{rendered}");
+    assert_eq!((error.code(), error.exit_code()), (code, 3), "{rendered}");
+    let place = error.place().expect("a place");
+    let edited = WHOLE.find(from).unwrap();
+    let offset = text[..edited].rfind('\n').unwrap() + 1;
+    // The nearest one after the edit, or else the last one before it (the header of the table).
+    let after = text[offset..].find(at).map(|found| offset + found);
+    let offset = after.or(text.rfind(at)).unwrap_or_else(|| panic!("{at} is not in the file"));
+    let line = line_of(&text, offset);
+    let column = text[..offset].chars().rev().take_while(|c| *c != '\n').count() + 1;
+    assert_eq!((place.line as usize, place.column as usize), (line, column), "{rendered}");
+    assert!(rendered.contains(&format!("smile/problem.toml:{line}:{column}")), "{rendered}");
+    assert!(rendered.contains(told), "`{told}` is not told:\n{rendered}");
+}
+
+#[test]
+fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
+    // C001 syntax
+    expect("kind = \"fit\"", "kind = fit", "C001", "fit", "write text in quotes");
+    expect("gauss = 5", "gauss = 5\ngauss = 4", "C001", "gauss = 4", "keep one of the two");
+    expect("kind = \"fit\"", "kind = \"fit", "C001", "\n\n[mesh]", "the quote that ends the text is missing");
+    // C002 unknown key
+    expect("c1_kpa", "c1", "C002", "c1", "did you mean `c1_kpa`? (the unit is part of the key: a number in kPa)");
+    expect("c1_kpa", "c1_pa", "C002", "c1_pa", "did you mean `c1_kpa`?");
+    expect("[solver]", "[solvers]", "C002", "solvers", "did you mean `solver`?");
+    expect("clamp = { face", "clampp = { face", "C002", "clampp", "did you mean `clamp`?");
+    expect("kappa_kpa = 10.0", "color = 1", "C002", "color", "it can hold: mooney-rivlin");
+    expect("gauss = 5", "gaus = 4\ngauss = 5", "C002", "gaus", "`gauss`? it is there already");
+    // C003 missing key
+    expect("c1_kpa = 0.5, ", "", "C003", "{ c2_kpa", "c1_kpa = 0.5");
+    expect("units = \"m\"\n", "", "C003", "[fit]", "units = \"m\"");
+    expect(
+        "fibre_angles_deg = [36, 0, 0]",
+        "",
+        "C003",
+        "[[muscle]]\nname = \"slab\"",
+        "fibre_angles_deg = [36, 0, 0]",
+    );
+    // C004 wrong type
+    expect("kappa_kpa = 10.0", "kappa_kpa = \"10\"", "C004", "\"10\"", "write the number without quotes");
+    expect("topic = \"/markers\"", "topic = 7", "C004", "7", "write it in quotes");
+    expect("[[probe]]", "[probe]", "C004", "[probe]", "[[probe]]");
+    expect("gauss = 5", "gauss = true", "C004", "true", "a whole number");
+    // C005 out of range
+    expect("kappa_kpa = 10.0", "kappa_kpa = -1", "C005", "-1", "= -1 kPa is not allowed: it must be 0 or more");
+    expect("kappa_kpa = 10.0", "kappa_kpa = nan", "C005", "nan", "a finite number");
+    expect("kappa_kpa = 10.0", "kappa_kpa = 1e999", "C005", "1e999", "a finite number");
+    expect("gauss = 5", "gauss = 9", "C005", "9", "a whole number from 3 to 8");
+    expect("gauss = 5", "gauss = 5.5", "C005", "5.5", "a whole number from 3 to 8");
+    expect("size_mm = [60, 20, 20]", "size_mm = [60, 0, 20]", "C005", "0, 20], el", "greater than 0");
+    expect(
+        "c1_kpa = 0.5, c2_kpa = 0.2",
+        "c1_kpa = 0, c2_kpa = 0",
+        "C005",
+        "0, c2",
+        "greater than 0 where c2_kpa is 0",
+    );
+    expect("lambda_star = 1.4", "lambda_star = 0.9", "C005", "0.9", "greater than lambda_ofl = 1.0");
+    expect("axis = [1, 0, 0]", "axis = [0, 0, 0]", "C005", "[0, 0, 0]", "a direction, not all 0");
+    expect("risorius.L = 0.05", "risorius.L = 1.05", "C005", "1.05", "from 0 to 1");
+    expect(
+        "step_min = 1e-3",
+        "step_max = 1e-5",
+        "C005",
+        "1e-5",
+        "step_min` = 0.0001 is not allowed: it must be at most step_max",
+    );
+    expect("last = 9", "first = 10, last = 9", "C005", "9", "at least first = 10");
+    expect("name = \"tip\"", "name = \"\"", "C005", "\"\"", "a name");
+    // C006 unknown choice
+    expect(
+        "kind = \"fit\"",
+        "kind = \"fitt\"",
+        "C006",
+        "\"fitt\"",
+        "did you mean \"fit\"? it can be \"forward\", \"fit\"",
+    );
+    expect("face = \"xi2=0\"", "face = \"top\"", "C006", "\"top\"", "it can be \"xi1=0\", \"xi1=1\"");
+    // C007 wrong length
+    expect("position_mm = [30, 10, 20]", "position_mm = [30, 10]", "C007", "[30, 10]", "has 2 entries, but needs 3");
+    expect(", [8,0,0.5]]", "]", "C007", "[[1,0,0]", "angles for 7 nodes, but needs 8");
+    expect("unknowns = [\"slab\"]", "unknowns = []", "C007", "[]", "at least one muscle");
+    // C008 duplicate name
+    let second = "[[probe]]\nname = \"tip\"\nposition_mm = [0, 0, 0]\n[fit]";
+    expect(
+        "[fit]",
+        second,
+        "C008",
+        "\"tip\"",
+        &format!("a second probe is called `tip`: the first is in line {}", line_with("\"tip\"")),
+    );
+    expect("unknowns = [\"slab\"]", "unknowns = [\"slab\",\"slab\"]", "C008", "\"slab\"]", "a second unknown");
+    // C009 unknown name
+    expect("unknowns = [\"slab\"]", "unknowns = [\"slap\"]", "C009", "\"slap\"", "did you mean `slab`?");
+    expect("risorius.L = 0.05", "masseter = 0.05", "C009", "masseter", "muscles: slab, risorius.L");
+    expect("risorius.L = 0.05", "risorius.l = 0.05", "C009", "risorius.l", "did you mean `risorius.L`?");
+    // C010 not in this version
+    let exf = "exf = \"face.exf\"";
+    expect(
+        "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }",
+        exf,
+        "C010",
+        "exf",
+        "use `block`",
+    );
+    expect("kind = \"fit\"", "kind = \"study\"", "C010", "\"study\"", "this version has \"forward\", \"fit\"");
+    expect("\"trilinear\"", "\"constant\"", "C010", "\"constant\"", "one pressure per element");
+    // C011 not exactly one
+    let both = "clamp = { face = \"xi1=0\" }\nsymmetry = { face = \"xi1=0\" }";
+    expect(
+        "[[support]]\nclamp = { face = \"xi1=0\" }",
+        &format!("[[support]]\n{both}"),
+        "C011",
+        "[[support]]",
+        "`clamp`, `symmetry`",
+    );
+    expect(
+        "\ngravity = { density_kg_m3 = 1040, acceleration_m_s2 = [0, 0, -9.81] }",
+        "",
+        "C011",
+        "[[load]]",
+        "holds none",
+    );
+}
+
+#[test]
+fn no_mistake_hides_another() {
+    let text = WHOLE
+        .replace("gauss = 5", "gauss = 50")
+        .replace("lambda_star = 1.4", "lambda_star = \"x\"")
+        .replace("xi2=0", "xi2=3")
+        .replace("[solver]", "[solver]\nstep = 1");
+    let error = parse(&text, &["solver.tolerance=0", "nonsense"]).unwrap_err();
+    let told: Vec<_> = error.mistakes().iter().map(|m| (m.code(), m.place().unwrap().line)).collect();
+    let expected = [
+        ("C005", 12),
+        ("C004", 19),
+        ("C004", 25),
+        ("C006", 30),
+        ("C002", line_with("[solver]") + 1),
+        ("C005", 1),
+        ("C013", 2),
+    ];
+    assert_eq!(told, expected);
+    let rendered = render_error(&error, false);
+    assert!(rendered.ends_with("error: 7 mistakes, nothing was run\n"), "{rendered}");
+    assert!(!rendered.contains('\u{1b}') && render_error(&error, true).contains('\u{1b}'));
+}
+
+#[test]
+fn an_empty_file_is_told_what_to_hold() {
+    let error = parse("", &[]).unwrap_err();
+    assert_eq!(error.to_string(), "the problem file lacks `task`, `mesh`, `tissue`");
+    assert!(error.help().unwrap().contains("[tissue]\nmooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }"));
+}
+
+#[test]
+fn tables_the_task_does_not_use_are_warned_of() {
+    let scene = parse(WHOLE, &["task.kind=forward"]).unwrap();
+    let told: Vec<_> = scene.warnings.iter().map(|w| (w.code, w.place.as_ref().unwrap().line)).collect();
+    assert_eq!(told, [("C015", line_with("[fit]")), ("C015", line_with("[[marker]]"))]);
+    let scene = parse(WHOLE, &["controls.slab=0.1"]).unwrap();
+    assert!(scene.warnings[0].message.contains("the value of the control `slab` is not used by the task \"fit\""));
+}
+
+#[test]
+fn overrides_are_merged_before_anything_is_checked() {
+    let set = |overrides: &[&str]| parse(WHOLE, overrides).unwrap();
+    assert_eq!(set(&["solver.step_max=0.02"]).solver.step_max, 0.02);
+    assert_eq!(set(&["tissue.kappa_kpa=0"]).tissue.kappa_kpa, 0.0);
+    assert_eq!(set(&["muscle.slab.gauss=4"]).muscles[0].gauss, 4);
+    assert_eq!(set(&["muscle[1].gauss=4"]).muscles[1].gauss, 4);
+    assert_eq!(set(&["muscle.risorius.L.gauss=5"]).muscles[1].gauss, 5);
+    assert_eq!(set(&["muscle.\"risorius.L\".gauss=6"]).muscles[1].gauss, 6);
+    assert_eq!(set(&["controls.risorius.L=0.5"]).controls[0].value, ControlValue::Constant(0.5));
+    assert_eq!(set(&["controls.\"risorius.L\" = 0.5"]).controls.len(), 1);
+    assert_eq!(set(&["controls.slab=0.1"]).controls[1].name, "slab");
+    assert_eq!(set(&["mesh.block.elements[0]=12"]).mesh.block.elements, [12, 2, 2]);
+    assert_eq!(set(&["mesh.block.elements=[3,1,1]"]).mesh.block.elements, [3, 1, 1]);
+    assert_eq!(set(&["fit.units=mm"]).fit.unwrap().units, Units::Mm);
+    assert_eq!(set(&["output.every=2", "output.every=3"]).output.every, 3);
+    // A value of the command line may mend the file.
+    assert_eq!(parse(&WHOLE.replace("gauss = 5", "gauss = 0"), &["tissue.gauss=4"]).unwrap().tissue.gauss, 4);
+}
+
+#[test]
+fn mistakes_in_overrides_point_at_the_command_line() {
+    for (argument, code, column, help) in [
+        ("solver.step_mx=2", "C002", 14, "did you mean `step_max`?"),
+        ("tissue.kappa_kpa=-1", "C005", 24, ""),
+        ("muscle.slap.gauss=3", "C013", 14, "did you mean `slab`?"),
+        ("muscle[7].gauss=3", "C013", 13, "counted from 0"),
+        ("muscle[x].gauss=3", "C013", 13, "muscle[0]"),
+        ("tissue.gauss.x=3", "C013", 20, "--set tissue.gauss=..."),
+        ("tissue..gauss=3", "C013", 14, "--set solver.step_max=0.02"),
+        ("nonsense", "C013", 7, "--set solver.step_max=0.02"),
+        ("tissue.gauss=[1", "C013", 20, "write a number"),
+        ("", "C013", 7, "--set"),
+    ] {
+        let error = parse(WHOLE, &["output.every=1", argument]).unwrap_err();
+        let rendered = render_error(&error, false);
+        let place = error.place().unwrap_or_else(|| panic!("{rendered}"));
+        assert_eq!(
+            (error.code(), &*place.file, place.line, place.column),
+            (code, "command line", 2, column),
+            "{rendered}"
+        );
+        assert!(error.help().unwrap_or_default().contains(help), "{rendered}");
+    }
+}
+
+#[test]
+fn a_lock_file_is_the_same_problem_from_any_folder() {
+    let scene = parse(WHOLE, &["fit.sd_mm=0.3", "controls.slab={ csv = \"curves.csv\" }"]).unwrap();
+    let lock = scene.lock();
+    let again = Scene::parse(&lock, "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();
+    assert_eq!(content(&scene), content(&again));
+    assert_eq!(lock, again.lock());
+    for default in ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""] {
+        assert!(lock.contains(default), "{default} is not in\n{lock}");
+    }
+}
+
+#[test]
+fn files_must_exist_and_curves_are_checked_with_the_problem() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("problem.toml");
+    std::fs::write(&path, WHOLE).unwrap();
+    let error = Scene::read(&path, &[]).unwrap_err();
+    assert_eq!((error.code(), error.place().unwrap().line), ("C012", line_with("smile.mcap")));
+    assert!(error.to_string().contains("smile.mcap"));
+
+    std::fs::write(folder.path().join("smile.mcap"), "").unwrap();
+    std::fs::write(folder.path().join("curves.csv"), "time_s,risorius.L\n0,0\n1,2\n").unwrap();
+    let csv = ["controls.risorius.L={csv=\"curves.csv\"}".to_string(), "controls.slab={csv=\"curves.csv\"}".into()];
+    let error = Scene::read(&path, &csv).unwrap_err();
+    assert_eq!((error.code(), error.place().unwrap().line, error.place().unwrap().column), ("C005", 3, 3));
+
+    std::fs::write(folder.path().join("curves.csv"), "time_s,risorius.L\n0,0\n1,1\n").unwrap();
+    let error = Scene::read(&path, &csv).unwrap_err();
+    assert_eq!(error.to_string(), "no column is called `slab`");
+    assert!(
+        matches!(&Scene::read(&path, &csv[..1]).unwrap().controls[0].value, ControlValue::Csv(csv) if csv.is_file())
+    );
+
+    std::fs::write(&path, b"[task]\nkind = \"\xff\"\n").unwrap();
+    let error = Scene::read(&path, &[]).unwrap_err();
+    assert_eq!((error.code(), error.place().unwrap().line), ("C001", 2));
+    let error = Scene::read(&folder.path().join("absent.toml"), &[]).unwrap_err();
+    assert_eq!((error.code(), error.exit_code()), ("O001", 6));
+    assert!(render_error(&error, false).starts_with("error[O001]: cannot read"));
+}
+
+#[test]
+fn curves_are_linear_between_rows_and_constant_outside() {
+    let muscles = ["slab".to_string(), "risorius.L".into()];
+    let curves = Curves::parse("time_s, risorius.L,slab\n0,0,1\n\n2, 0.5,0\n", "c.csv", &muscles).unwrap();
+    assert_eq!(curves.at("risorius.L", 1.0), Some(0.25));
+    assert_eq!((curves.at("slab", -1.0), curves.at("slab", 9.0), curves.at("x", 0.0)), (Some(1.0), Some(0.0), None));
+    for (text, code, line, column) in [
+        ("time_s,slab\n0,x\n", "C004", 2, 3),
+        ("time_s,slab\n0,\n", "C004", 2, 3),
+        ("time_s,slab\n0,nan\n", "C005", 2, 3),
+        ("time_s,slab\n0, 1.5\n", "C005", 2, 4),
+        ("time_s,slap\n0,1\n", "C009", 1, 8),
+        ("time_s,slab,slab\n0,1,1\n", "C008", 1, 13),
+        ("time_s,slab\n1,0\n1,0\n", "C014", 3, 1),
+        ("time_s,slab\n1,0,0\n", "C007", 2, 1),
+        ("t,slab\n1,0\n", "C003", 1, 1),
+        ("time_s,slab\n", "C007", 0, 0),
+        ("", "C003", 0, 0),
+    ] {
+        let error = Curves::parse(text, "c.csv", &muscles).expect_err(text);
+        let place = error.place().unwrap_or_else(|| panic!("{error}"));
+        assert_eq!((error.code(), place.line, place.column), (code, line, column), "{text}");
+    }
+}
+
+#[test]
+fn a_terminal_cannot_be_controlled_through_a_file() {
+    let error = parse(&WHOLE.replace("[controls]", "[controls]\n\"\\u001b[31m\" = 1"), &[]).unwrap_err();
+    assert_eq!(error.code(), "C009");
+    assert!(!render_error(&error, false).contains('\u{1b}'));
+}
+
+/// Reads, and if that fails renders every message: neither may panic.
+fn survives(text: &str, overrides: &[&str]) {
+    if let Err(error) = parse(text, overrides) {
+        assert!(!error.mistakes().is_empty(), "a failure without a mistake:\n{text}");
+        render_error(&error, true);
+        assert!(error.mistakes().iter().all(|mistake| !matches!(mistake, Error::Mistakes(_))));
+    }
+}
+
+#[test]
+fn a_file_cut_anywhere_never_panics() {
+    for (end, _) in WHOLE.char_indices() {
+        survives(&WHOLE[..end], &[]);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn garbage_never_panics(at in 0..WHOLE.len(), length in 0..20usize, junk in "[\\PC\\n\\r\"\\[\\]{}=.,#]{0,12}", set in "\\PC{0,20}") {
+        let end = (at + length).min(WHOLE.len());
+        survives(&format!("{}{junk}{}", &WHOLE[..at], &WHOLE[end..]), &[&set]);
+        survives(&junk, &[&format!("tissue.gauss{set}"), &junk]);
+        let _ = Curves::parse(&format!("time_s,slab\n{junk}\n{set}"), "c.csv", &["slab".into()]);
+    }
+
+    #[test]
+    fn any_value_survives_the_lock(
+        origin in [any::<f64>(), any::<f64>(), any::<f64>()],
+        c1 in 0.0..1e300f64,
+        kappa in prop_oneof![Just(0.0), Just(-0.0), f64::MIN_POSITIVE..1e9],
+        angle in prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+        activation in 0.0..=1.0f64,
+        elements in 1..1000usize,
+        name in "\\PC{1,8}",
+        topic in "[\\PC\\t\\n]{1,8}",
+    ) {
+        prop_assume!(origin.iter().all(|x| x.is_finite()));
+        let mut scene = parse(WHOLE, &[]).unwrap();
+        scene.mesh.block.origin_mm = origin;
+        scene.mesh.block.elements[1] = elements;
+        scene.tissue.law = LawSpec::MooneyRivlin { c1_kpa: c1, c2_kpa: 1e-3 };
+        scene.tissue.kappa_kpa = kappa;
+        scene.muscles[0].fibres = FibresSpec::Uniform([angle, 0.0, -0.0]);
+        scene.controls[0].value = ControlValue::Constant(activation);
+        scene.probes[0].name = name;
+        scene.fit.as_mut().unwrap().topic = Some(topic);
+        let again = parse(&scene.lock(), &[]).unwrap();
+        prop_assert_eq!(content(&scene), content(&again));
+        prop_assert_eq!(scene.lock(), again.lock());
+    }
+}
