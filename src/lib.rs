@@ -3,5 +3,6 @@
 //! risorius finds out which muscles moved a face.
 
 pub mod error;
+pub mod markers;
 
 pub use error::{Error, Result};
