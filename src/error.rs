@@ -43,7 +43,7 @@ pub enum Error {
     /// The file stops too early.
     #[error(
         "{} is cut short: {bytes} bytes, the record at byte {offset} is incomplete; \
-         intact are {messages} messages, of them {frames} frames of markers over {seconds} s",
+         intact are {messages} messages, of them {frames} frames of markers over {seconds:.3} s",
         path.display()
     )]
     TruncatedRecording {

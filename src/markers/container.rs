@@ -133,11 +133,12 @@ struct Walk<'a> {
 impl Walk<'_> {
     fn file(mut self, bytes: &[u8]) -> Damaged<Container> {
         let mut at = mcap::MAGIC.len();
+        let closed = bytes[at..].ends_with(mcap::MAGIC);
         // Start of the summary section and whether the data section had a CRC, once its end is seen.
         let mut data_end: Option<(usize, bool)> = None;
         loop {
             let rest = &bytes[at..];
-            let Some((opcode, body)) = split_record(at, rest, bytes.ends_with(mcap::MAGIC))? else {
+            let Some((opcode, body)) = split_record(at, rest, closed)? else {
                 return Ok(self.cut(at, bytes.len(), data_end.is_some_and(|(_, crc)| crc)));
             };
             let damaged = |damage| (at, opcode, damage);

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::damage::Unguarded;
+use super::recording::Units;
 
 /// An interval longer than this many median intervals is a gap.
 const GAP: f64 = 1.5;
@@ -160,7 +161,7 @@ pub enum Warning {
         /// In the file.
         declared: String,
         /// Asked for.
-        used: String,
+        used: Units,
     },
     /// Positions at exactly (0, 0, 0) were kept, as asked.
     ZerosKept {

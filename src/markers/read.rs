@@ -40,7 +40,7 @@ impl Default for ReadOptions {
 
 /// Reads the markers of one topic of an MCAP file.
 ///
-/// Errors: M001 to M013 and O001, each with its numbers; see [`crate::Error`].
+/// Errors: M001 to M012 and O001, each with its numbers; see [`crate::Error`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     read_bytes(path, &load(path)?, options)
 }
@@ -169,12 +169,12 @@ pub(super) fn decode(
     if clock != Clock::Header {
         warnings.push(Warning::ClockFallback { stamped, messages: messages.len(), used: clock });
     }
-    let used = options.units.name();
+    let disagrees = |declared: &&String| Units::from_name(declared) != Some(options.units);
     warnings.extend(
         units_declared
             .iter()
-            .filter(|declared| *declared != used)
-            .map(|declared| Warning::UnitsDisagree { declared: declared.clone(), used: used.into() }),
+            .filter(disagrees)
+            .map(|declared| Warning::UnitsDisagree { declared: declared.clone(), used: options.units }),
     );
     if zeros_kept > 0 {
         warnings.push(Warning::ZerosKept { samples: zeros_kept });

@@ -34,6 +34,17 @@ impl Units {
         }
     }
 
+    /// The unit that a file means by a word such as `mm`, `millimetre` or `Millimeters`.
+    pub fn from_name(name: &str) -> Option<Units> {
+        let name = name.trim().to_lowercase().replace("metre", "meter");
+        match name.strip_suffix('s').unwrap_or(&name) {
+            "mm" | "millimeter" => Some(Units::Mm),
+            "cm" | "centimeter" => Some(Units::Cm),
+            "m" | "meter" => Some(Units::M),
+            _ => None,
+        }
+    }
+
     /// `mm`, `cm` or `m`.
     pub fn name(self) -> &'static str {
         match self {

@@ -18,6 +18,9 @@ use super::format::{DecodeFault, Decoder, Fault, Format, Observation, Sample, Un
 /// `mocap4r2_msgs/msg/Markers`.
 pub(super) struct Ros2;
 
+/// Value of `id_type` for markers that are known by their name only.
+const USE_NAME: i64 = 0;
+
 /// Value of `id_type` for markers that are known by their index only.
 const USE_INDEX: i64 = 1;
 
@@ -123,7 +126,12 @@ impl Markers {
             _ => "",
         };
         let index = at(layout.index).and_then(integer);
-        let by_index = name.is_empty() || at(layout.id_type).and_then(integer) == Some(USE_INDEX);
+        let by_index = match at(layout.id_type).and_then(integer) {
+            _ if layout.name.is_none() => true,
+            Some(USE_INDEX) => true,
+            Some(USE_NAME) => false,
+            _ => name.is_empty(),
+        };
         let label = match index {
             Some(index) if by_index => index.to_string(),
             _ => name.to_string(),
