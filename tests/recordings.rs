@@ -13,7 +13,7 @@ use risorius::markers::{
 use risorius::{Error, Result};
 use writer::{
     CONTAINERS, COORDINATES_SCHEMA, Message, POSITIONS_SCHEMA, Ros2Marker, Topic, container, file, ros2_message,
-    ros2_schema, without_chunk_crcs,
+    ros2_schema, with_definitions_outside_chunks, without_chunk_crcs,
 };
 
 const START: i64 = 1_700_000_000_000_000_000;
@@ -441,8 +441,10 @@ fn flip_bits(context: &str, bytes: &[u8], bits: impl Iterator<Item = usize>) -> 
                 errors += 1;
             }
         }
-        let looked_at = catch_unwind(AssertUnwindSafe(|| inspect_bytes(Path::new("test.mcap"), &bytes).is_ok()));
-        assert!(looked_at.is_ok(), "{context}: inspect panics with bit {bit} flipped");
+        if bit % 5 == 0 {
+            let inspect = || inspect_bytes(Path::new("test.mcap"), &bytes).is_ok();
+            assert!(catch_unwind(inspect).is_ok(), "{context}: inspect panics with bit {bit} flipped");
+        }
         bytes[bit / 8] ^= 1 << (bit % 8);
     }
     errors
@@ -480,12 +482,12 @@ fn a_flipped_bit_never_gives_a_wrong_value() {
 
 #[test]
 fn every_bit_of_small_files() {
-    let topics = [Topic::ros2(false, ros2_messages(3, false, false))];
+    let topics = [Topic::ros2(false, ros2_messages(2, false, false))];
     let cases = [
         ("zstd", without_data_crc("zstd")),
-        ("zstd, no statistics", without_data_crc("zstd").emit_statistics(false)),
+        ("zstd, no statistics", without_data_crc("zstd").emit_statistics(false).chunk_size(Some(1))),
         ("zstd, no summary crc", without_data_crc("zstd").calculate_summary_section_crc(false)),
-        ("lz4, no chunk indexes", without_data_crc("lz4").emit_chunk_indexes(false)),
+        ("lz4, no chunk indexes", without_data_crc("lz4").emit_chunk_indexes(false).chunk_size(Some(1))),
         ("none", without_data_crc("none").chunk_size(Some(1))),
         ("unchunked", container("unchunked")),
     ];
@@ -494,6 +496,16 @@ fn every_bit_of_small_files() {
         let errors = flip_bits(kind, &bytes, 0..bytes.len() * 8);
         assert!(errors > bytes.len() * 2, "{kind}: {errors} errors for {} bytes", bytes.len());
     }
+}
+
+#[test]
+fn definitions_outside_chunks_are_guarded_by_their_copy() {
+    let topics = [Topic::ros2(false, ros2_messages(3, false, false))];
+    let options = without_data_crc("zstd").calculate_summary_section_crc(false);
+    let (bytes, place) = with_definitions_outside_chunks(&file(options, &topics));
+    check_tracks(&load(&bytes, &ReadOptions::default()).unwrap(), 3, "copies");
+    let errors = flip_bits("definitions", &bytes, place.start * 8..place.end * 8);
+    assert!(errors > place.len() * 7, "{errors} errors for {} bytes", place.len());
 }
 
 #[test]

@@ -185,3 +185,23 @@ pub fn without_chunk_crcs(mut bytes: Vec<u8>) -> Vec<u8> {
         at = body + length;
     }
 }
+
+/// The file, written without CRCs of its sections, with copies of the schema and channel records of its summary put
+/// in front of its first chunk, as some writers do. Returns where they are, bytes.
+pub fn with_definitions_outside_chunks(bytes: &[u8]) -> (Vec<u8>, std::ops::Range<usize>) {
+    let record = |at: usize| u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) as usize + 9;
+    let start = mcap::MAGIC.len() + record(mcap::MAGIC.len());
+    let footer = bytes.len() - mcap::MAGIC.len() - 20;
+    let summary = u64::from_le_bytes(bytes[footer..footer + 8].try_into().unwrap());
+    let (mut copies, mut at) = (Vec::new(), summary as usize);
+    while at < footer - 9 {
+        if [mcap::records::op::SCHEMA, mcap::records::op::CHANNEL].contains(&bytes[at]) {
+            copies.extend(&bytes[at..at + record(at)]);
+        }
+        at += record(at);
+    }
+    let mut result = [&bytes[..start], &copies, &bytes[start..]].concat();
+    let footer = footer + copies.len();
+    result[footer..footer + 8].copy_from_slice(&(summary + copies.len() as u64).to_le_bytes());
+    (result, start..start + copies.len())
+}
