@@ -5,6 +5,7 @@
 pub mod cli;
 pub mod error;
 pub mod forward;
+pub mod markers;
 pub mod material;
 pub mod math;
 pub mod mesh;

@@ -1,0 +1,160 @@
+//! What a marker format is, and the list of them. To add one: a file with its `Format`, and a line in [`FORMATS`].
+
+use super::fields::SchemaRecord;
+use super::json::Json;
+use super::ros2::{Ros2, SchemaFault};
+
+/// Every format, asked in this order.
+const FORMATS: [&dyn Format; 2] = [&Ros2, &Json];
+
+/// A way in which messages carry markers. The schema in the file decides whether it is this one.
+pub(super) trait Format: Sync {
+    /// The name in messages and reports.
+    fn name(&self) -> &'static str;
+
+    /// A decoder for messages of this schema and encoding, or why there is none.
+    fn decoder(&self, schema: &SchemaRecord, encoding: &str) -> Result<Box<dyn Decoder>, Unreadable>;
+}
+
+/// Turns the payload of a message into marker samples.
+pub(super) trait Decoder {
+    /// Decodes one message; a fault says at which byte.
+    fn decode(&self, payload: &[u8]) -> Result<Observation, DecodeFault>;
+}
+
+/// The markers of one message.
+#[derive(Debug)]
+pub(super) struct Observation {
+    /// Time in the message itself, nanoseconds.
+    pub stamp_ns: Option<i64>,
+    /// The unit the message says it is in.
+    pub unit: Option<String>,
+    /// Label (empty: unlabelled) and what was seen.
+    pub samples: Vec<(String, Sample)>,
+}
+
+/// One marker at one time, in the unit of the file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Sample {
+    Position([f64; 3]),
+    /// The message names the marker and gives no position.
+    Absent,
+    /// The message says that the position does not count.
+    Invalid,
+}
+
+/// Why no format reads a topic.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Unreadable {
+    /// No format has this pair of schema encoding and message encoding.
+    #[error("no marker format has this encoding")]
+    Encoding,
+    /// The channel has no schema.
+    #[error("it has no schema")]
+    NoSchema,
+    /// The schema describes something else.
+    #[error("its schema has not {expected}")]
+    Layout {
+        /// The fields looked for.
+        expected: &'static str,
+    },
+    /// The schema cannot be read.
+    #[error("{0}")]
+    Schema(#[from] SchemaFault),
+    /// The schema is not JSON.
+    #[error("its schema is not JSON (line {line}, column {column})")]
+    NotJson {
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+    },
+}
+
+/// A message that does not hold what its schema promises.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct DecodeFault {
+    /// Place in the payload, bytes.
+    pub byte: usize,
+    pub fault: Fault,
+}
+
+/// What is wrong with a message.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Fault {
+    /// The message ends too early.
+    #[error("{needed} more bytes expected, {left} left")]
+    Short {
+        /// Bytes (or elements of at least a byte) that should follow.
+        needed: usize,
+        /// Bytes that follow.
+        left: usize,
+    },
+    /// The message is longer than its schema says.
+    #[error("{bytes} bytes are left over")]
+    Left {
+        /// Bytes behind the last field.
+        bytes: usize,
+    },
+    /// More elements than the schema allows.
+    #[error("{count} elements, the schema allows {bound}")]
+    Bound {
+        /// Elements in the message.
+        count: usize,
+        /// Largest number allowed.
+        bound: usize,
+    },
+    /// A truth value that is neither 0 nor 1.
+    #[error("a truth value is neither 0 nor 1")]
+    Bool,
+    /// A text without its closing zero, or not UTF-8.
+    #[error("a text is not closed or not UTF-8")]
+    Text,
+    /// An encoding other than plain CDR; has its own error.
+    #[error("encapsulation {:02x}{:02x}", id[0], id[1])]
+    Encapsulation {
+        /// The first two bytes.
+        id: [u8; 2],
+    },
+    /// A time stamp that is none.
+    #[error("the time stamp {sec} s + {nanosec} ns is out of range")]
+    Stamp {
+        /// Seconds.
+        sec: i64,
+        /// Nanoseconds, below 1e9 in a good stamp.
+        nanosec: i64,
+    },
+    /// A field is not of the expected kind.
+    #[error("the fields are not those of the schema")]
+    Shape,
+    /// The message is not the JSON that its schema promises.
+    #[error("{message}")]
+    Json {
+        /// What the JSON reader said.
+        message: String,
+    },
+}
+
+/// Nanoseconds of a stamp in two parts.
+pub(super) fn stamp_ns(sec: i64, nanosec: i64) -> Result<i64, Fault> {
+    let whole = || sec.checked_mul(1_000_000_000)?.checked_add(nanosec);
+    let stamp = if (0..1_000_000_000).contains(&nanosec) { whole() } else { None };
+    stamp.ok_or(Fault::Stamp { sec, nanosec })
+}
+
+/// Name and decoder of the format that reads messages of this schema and encoding.
+pub(super) fn decoder(
+    schema: Option<&SchemaRecord>,
+    encoding: &str,
+) -> Result<(&'static str, Box<dyn Decoder>), Unreadable> {
+    let schema = schema.ok_or(Unreadable::NoSchema)?;
+    let mut reason = Unreadable::Encoding;
+    for format in FORMATS {
+        match format.decoder(schema, encoding) {
+            Ok(decoder) => return Ok((format.name(), decoder)),
+            Err(Unreadable::Encoding) => {}
+            Err(other) => reason = other,
+        }
+    }
+    Err(reason)
+}

@@ -1,0 +1,229 @@
+//! Reading one topic of a file into a [`Recording`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::container::{Container, Message};
+use super::format::{self, Fault};
+use super::health::{Clock, Health, Missing, Timing, Warning, seconds};
+use super::recording::{Collector, Frame, Recording, Source, Units};
+use super::topic::{Reader, Topic, readers};
+use crate::{Error, Result};
+
+/// How to read a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// The topic; `None`: the only one with markers.
+    pub topic: Option<String>,
+    /// The unit of the positions in the file. Never guessed, and never taken from the file.
+    pub units: Units,
+    /// Whether a marker at exactly (0, 0, 0) is a lost one, as many drivers publish them.
+    pub zero_is_missing: bool,
+    /// Whether the intact part of a file that is cut short will do.
+    pub allow_truncated: bool,
+    /// Whether a file will do in which damage would go unseen, because its writer computed no checksums.
+    pub allow_unchecked: bool,
+}
+
+impl Default for ReadOptions {
+    /// The only topic with markers, millimetres, zero is missing, whole and checked files.
+    fn default() -> Self {
+        ReadOptions {
+            topic: None,
+            units: Units::Mm,
+            zero_is_missing: true,
+            allow_truncated: false,
+            allow_unchecked: false,
+        }
+    }
+}
+
+/// Reads the markers of one topic of an MCAP file.
+///
+/// Errors: M001 to M012 and O001, each with its numbers; see [`crate::Error`].
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
+    read_bytes(path, &load(path)?, options)
+}
+
+/// [`read`] for a file that is already in memory; `path` names it in messages.
+pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    let container = Container::read(path, bytes, &|channel, schema| {
+        let named = options.topic.as_ref().is_none_or(|topic| *topic == channel.topic);
+        named && format::decoder(schema, &channel.encoding).is_ok()
+    })?;
+    if !options.allow_truncated {
+        whole(path, &container, options)?;
+    }
+    if let Some(part) = container.unguarded.filter(|_| !options.allow_unchecked) {
+        return Err(Error::UncheckedRecording { path: path.into(), part });
+    }
+    let reader = choose(path, readers(&container), options)?;
+    let recording = decode(path, &container, &reader, options)?;
+    if recording.health.labels.iter().all(|label| label.present == 0) {
+        let missing = recording.health.labels.iter().map(|label| label.missing);
+        return Err(Error::NoSamples {
+            path: path.into(),
+            topic: reader.topic.name,
+            frames: recording.frames.len(),
+            labels: recording.labels.len(),
+            missing: missing.fold(Missing::default(), Missing::plus),
+        });
+    }
+    Ok(recording)
+}
+
+/// The bytes of a file.
+pub(super) fn load(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })
+}
+
+/// An error for a file that is cut short, saying what is intact.
+fn whole(path: &Path, container: &Container, options: &ReadOptions) -> Result<()> {
+    let Some(cut) = container.truncated else {
+        return Ok(());
+    };
+    let reader = choose(path, readers(container), options);
+    let intact = reader.and_then(|reader| decode(path, container, &reader, options)).ok();
+    Err(Error::TruncatedRecording {
+        path: path.into(),
+        bytes: cut.bytes,
+        offset: cut.offset,
+        messages: container.message_count(),
+        frames: intact.as_ref().map_or(0, |recording| recording.frames.len()),
+        seconds: intact.as_ref().map_or(0.0, |recording| recording.health.duration_s),
+    })
+}
+
+/// The topic that was asked for, or the only one with markers.
+fn choose(path: &Path, mut readers: BTreeMap<String, Reader>, options: &ReadOptions) -> Result<Reader> {
+    let all: Vec<Topic> = readers.values().map(|reader| reader.topic.clone()).collect();
+    let name = match &options.topic {
+        Some(name) => name.clone(),
+        None => {
+            let mut readable = all.iter().filter(|topic| topic.is_readable());
+            match (readable.next(), readable.next()) {
+                (Some(only), None) => only.name.clone(),
+                (None, _) => return Err(Error::NoMarkerTopic { path: path.into(), topics: all }),
+                (Some(_), Some(_)) => return Err(Error::SeveralMarkerTopics { path: path.into(), topics: all }),
+            }
+        }
+    };
+    let Some(reader) = readers.remove(&name) else {
+        let closeness = |topic: &&Topic| strsim::jaro_winkler(&topic.name, &name);
+        let nearest = all.iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b)));
+        let nearest = nearest.filter(|topic| closeness(topic) > 0.7).map(|topic| topic.name.clone());
+        return Err(Error::TopicNotFound { path: path.into(), topic: name, nearest, topics: all });
+    };
+    if let Some(reason) = reader.fault {
+        return Err(Error::TopicNotReadable { path: path.into(), topic: name, reason, topics: all });
+    }
+    if reader.topic.messages == 0 {
+        return Err(Error::EmptyTopic { path: path.into(), topic: name });
+    }
+    Ok(reader)
+}
+
+/// Decodes all messages of a topic.
+pub(super) fn decode(
+    path: &Path,
+    container: &Container,
+    reader: &Reader,
+    options: &ReadOptions,
+) -> Result<Recording> {
+    let mut collector = Collector::default();
+    collector.units = reader.units.clone();
+    let mut messages = Vec::new();
+    for message in &container.messages {
+        let Some(decoder) = reader.decoders.get(&message.channel) else {
+            continue;
+        };
+        let observation = decoder.decode(&message.payload).map_err(|found| {
+            let (path, topic, sequence) = (path.into(), reader.topic.name.clone(), message.sequence);
+            match found.fault {
+                Fault::Encapsulation { id } => Error::UnsupportedEncapsulation { path, topic, sequence, id },
+                fault => Error::Undecodable {
+                    path,
+                    topic,
+                    sequence,
+                    log_time_ns: message.log_time,
+                    byte: found.byte,
+                    fault,
+                },
+            }
+        })?;
+        messages.push((message, observation.stamp_ns));
+        collector.add(observation);
+    }
+    let (clock, stamps) = clock(&messages);
+    let stamped = messages.iter().filter(|(_, stamp)| stamp.is_some()).count();
+    let (unlabelled_samples, units_declared) = (collector.unlabelled, collector.units.clone());
+    let ((labels, positions, label_health), zeros_kept) =
+        collector.finish(options.units.mm(), options.zero_is_missing);
+
+    let mut warnings = Vec::new();
+    warnings.extend(container.truncated.map(|cut| Warning::Truncated { offset: cut.offset, bytes: cut.bytes }));
+    warnings.extend(container.unguarded.map(|part| Warning::Unchecked { part }));
+    if container.chunks_without_crc > 0 {
+        warnings.push(Warning::ChunksWithoutChecksum { chunks: container.chunks_without_crc });
+    }
+    if clock != Clock::Header {
+        warnings.push(Warning::ClockFallback { stamped, messages: messages.len(), used: clock });
+    }
+    let disagrees = |declared: &&String| Units::from_name(declared) != Some(options.units);
+    warnings.extend(
+        units_declared
+            .iter()
+            .filter(disagrees)
+            .map(|declared| Warning::UnitsDisagree { declared: declared.clone(), used: options.units }),
+    );
+    if zeros_kept > 0 {
+        warnings.push(Warning::ZerosKept { samples: zeros_kept });
+    }
+
+    let timing = Timing::of(&stamps);
+    let first = stamps.first().copied().unwrap_or(0);
+    let frame = |(stamp_ns, positions_mm)| Frame { time_s: seconds(first, stamp_ns), stamp_ns, positions_mm };
+    let frames: Vec<Frame> = stamps.into_iter().zip(positions).map(frame).collect();
+    let health = Health {
+        frames: frames.len(),
+        duration_s: timing.duration_s,
+        rate_hz: timing.rate_hz,
+        jitter_s: timing.jitter_s,
+        duplicate_stamps: timing.duplicate_stamps,
+        backward_steps: timing.backward_steps,
+        gaps: timing.gaps,
+        unlabelled_samples,
+        labels: label_health,
+        warnings,
+    };
+    let source = Source {
+        path: path.into(),
+        topic: reader.topic.name.clone(),
+        schema: reader.topic.schema.clone(),
+        schema_encoding: reader.topic.schema_encoding.clone(),
+        message_encoding: reader.topic.message_encoding.clone(),
+        format: reader.topic.markers.clone().unwrap_or_default(),
+        compression: container.compression.clone(),
+        units_declared,
+        units: options.units,
+        clock,
+    };
+    Ok(Recording { source, labels, frames, health })
+}
+
+/// One clock for the whole recording: the stamp in the message if every message has one, else publish time, else log
+/// time. A clock that is zero throughout was never set. Stamps in nanoseconds.
+fn clock(messages: &[(&Message, Option<i64>)]) -> (Clock, Vec<i64>) {
+    let is_set = |stamps: &[i64]| stamps.iter().any(|stamp| *stamp != 0);
+    // A container time beyond the year 2262 does not fit; it stops at the end of the range.
+    let time = |time: u64| i64::try_from(time).unwrap_or(i64::MAX);
+    let stamped: Option<Vec<i64>> = messages.iter().map(|(_, stamp)| *stamp).collect();
+    if let Some(stamps) = stamped.filter(|stamps| is_set(stamps)) {
+        return (Clock::Header, stamps);
+    }
+    let published: Vec<i64> = messages.iter().map(|(message, _)| time(message.publish_time)).collect();
+    if is_set(&published) {
+        return (Clock::Publish, published);
+    }
+    (Clock::Log, messages.iter().map(|(message, _)| time(message.log_time)).collect())
+}

@@ -1,0 +1,197 @@
+//! The one type all marker recordings become.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::format::{Observation, Sample};
+use super::health::{Clock, Health, LabelHealth, Missing};
+
+/// The length unit of the positions in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Units {
+    /// Millimetres.
+    #[default]
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
+
+impl Units {
+    /// All of them, the smallest first.
+    pub const ALL: [Units; 3] = [Units::Mm, Units::Cm, Units::M];
+
+    /// How many millimetres one of it is.
+    pub fn mm(self) -> f64 {
+        match self {
+            Units::Mm => 1.0,
+            Units::Cm => 10.0,
+            Units::M => 1000.0,
+        }
+    }
+
+    /// The unit that a file means by a word such as `mm`, `millimetre` or `Millimeters`.
+    pub fn from_name(name: &str) -> Option<Units> {
+        let name = name.trim().to_lowercase().replace("metre", "meter");
+        match name.strip_suffix('s').unwrap_or(&name) {
+            "mm" | "millimeter" => Some(Units::Mm),
+            "cm" | "centimeter" => Some(Units::Cm),
+            "m" | "meter" => Some(Units::M),
+            _ => None,
+        }
+    }
+
+    /// `mm`, `cm` or `m`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Units::Mm => "mm",
+            Units::Cm => "cm",
+            Units::M => "m",
+        }
+    }
+}
+
+impl std::fmt::Display for Units {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Tracks of surface markers: who was where, when, and what is missing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Where it comes from.
+    pub source: Source,
+    /// Names of the markers, in the order in which they first appear in the file.
+    pub labels: Vec<String>,
+    /// The frames in the order of the file. Nothing is resampled, sorted or filled.
+    pub frames: Vec<Frame>,
+    /// What is known about its quality.
+    pub health: Health,
+}
+
+/// All markers at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Seconds since the first frame.
+    pub time_s: f64,
+    /// Absolute time as in the file, nanoseconds.
+    pub stamp_ns: i64,
+    /// Positions in millimetres, one per label; `None` where the sample is missing.
+    pub positions_mm: Vec<Option<[f64; 3]>>,
+}
+
+/// Where a recording comes from and how it was read.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    /// The topic in it.
+    pub topic: String,
+    /// Name of the schema, for example `mocap4r2_msgs/msg/Markers`.
+    pub schema: String,
+    /// Encoding of the schema, for example `ros2msg`.
+    pub schema_encoding: String,
+    /// Encoding of the messages, for example `cdr`.
+    pub message_encoding: String,
+    /// The marker format that read it.
+    pub format: String,
+    /// Number of chunks by compression (`none`, `lz4`, `zstd`); empty for a file without chunks.
+    pub compression: BTreeMap<String, u64>,
+    /// Units that the file declares in its messages or in the metadata of the topic (`unit`, `units`).
+    pub units_declared: Vec<String>,
+    /// The unit it was read with.
+    pub units: Units,
+    /// The clock of the stamps.
+    pub clock: Clock,
+}
+
+/// Collects observations into frames.
+#[derive(Default)]
+pub(super) struct Collector {
+    labels: Vec<String>,
+    places: HashMap<String, usize>,
+    frames: Vec<Vec<Option<Sample>>>,
+    /// Label and frame of samples whose label stands more than once in their message.
+    ambiguous: Vec<(usize, usize)>,
+    pub unlabelled: u64,
+    pub units: Vec<String>,
+}
+
+/// Labels, positions (mm) per frame, and the health of every label.
+pub(super) type Tracks = (Vec<String>, Vec<Vec<Option<[f64; 3]>>>, Vec<LabelHealth>);
+
+impl Collector {
+    pub fn add(&mut self, observation: Observation) {
+        if let Some(unit) = observation.unit.filter(|unit| !self.units.contains(unit)) {
+            self.units.push(unit);
+        }
+        let frame = self.frames.len();
+        let mut samples = vec![None; self.labels.len()];
+        for (label, sample) in observation.samples {
+            if label.is_empty() {
+                self.unlabelled += 1;
+                continue;
+            }
+            let place = *self.places.entry(label).or_insert_with_key(|label| {
+                self.labels.push(label.clone());
+                self.labels.len() - 1
+            });
+            samples.resize(self.labels.len().max(samples.len()), None);
+            if samples[place].replace(sample).is_some() {
+                self.ambiguous.push((place, frame));
+            }
+        }
+        self.frames.push(samples);
+    }
+
+    /// Positions times `scale` (mm per unit of the file); the other kinds become missing and are counted.
+    pub fn finish(mut self, scale: f64, zero_is_missing: bool) -> (Tracks, u64) {
+        self.ambiguous.dedup();
+        let ambiguous: std::collections::HashSet<_> = self.ambiguous.into_iter().collect();
+        let mut zeros_kept = 0;
+        let mut health: Vec<_> = self.labels.iter().map(|label| LabelHealth::new(label)).collect();
+        let mut positions = Vec::with_capacity(self.frames.len());
+        for (frame, mut samples) in self.frames.into_iter().enumerate() {
+            samples.resize(self.labels.len(), None);
+            let position = |(place, sample): (usize, Option<Sample>)| {
+                let LabelHealth { present, missing, .. } = &mut health[place];
+                let missing: &mut Missing = missing;
+                let scaled = match sample {
+                    _ if ambiguous.contains(&(place, frame)) => {
+                        missing.ambiguous += 1;
+                        return None;
+                    }
+                    None | Some(Sample::Absent) => {
+                        missing.absent += 1;
+                        return None;
+                    }
+                    Some(Sample::Invalid) => {
+                        missing.invalid += 1;
+                        return None;
+                    }
+                    Some(Sample::Position(position)) => position.map(|coordinate| coordinate * scale),
+                };
+                if !scaled.iter().all(|coordinate| coordinate.is_finite()) {
+                    missing.not_finite += 1;
+                    return None;
+                }
+                if scaled == [0.0; 3] {
+                    if zero_is_missing {
+                        missing.zero += 1;
+                        return None;
+                    }
+                    zeros_kept += 1;
+                }
+                *present += 1;
+                Some(scaled)
+            };
+            positions.push(samples.into_iter().enumerate().map(position).collect());
+        }
+        ((self.labels, positions, health), zeros_kept)
+    }
+}

@@ -1,0 +1,106 @@
+//! The topics of a file, and which of them carries markers.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::Serialize;
+
+use super::container::{Container, Traffic};
+use super::format::{self, Decoder, Unreadable};
+
+/// One topic of a file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// Name of its schema; empty if it has none.
+    pub schema: String,
+    /// Encoding of the schema, for example `ros2msg`.
+    pub schema_encoding: String,
+    /// Encoding of its messages, for example `cdr`.
+    pub message_encoding: String,
+    /// Number of messages.
+    pub messages: u64,
+    /// Log time of the first and the last message, nanoseconds.
+    pub log_time_ns: Option<[u64; 2]>,
+    /// The marker format that reads it, or why none does.
+    pub markers: std::result::Result<String, String>,
+}
+
+impl Topic {
+    /// Whether its markers can be read.
+    pub fn is_readable(&self) -> bool {
+        self.markers.is_ok()
+    }
+}
+
+impl fmt::Display for Topic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Topic { name, schema, schema_encoding, message_encoding, messages, .. } = self;
+        write!(f, "`{name}`: {schema} ({message_encoding}, {schema_encoding}), {messages} messages, ")?;
+        match &self.markers {
+            Ok(format) => write!(f, "readable as {format}"),
+            Err(reason) => write!(f, "not readable: {reason}"),
+        }
+    }
+}
+
+/// Topics one per line, for messages.
+pub(crate) fn list(topics: &[Topic]) -> String {
+    match topics {
+        [] => "no topics at all".into(),
+        topics => topics.iter().map(|topic| format!("\n  {topic}")).collect(),
+    }
+}
+
+/// A topic with what reads its messages.
+pub(super) struct Reader {
+    pub topic: Topic,
+    /// One per channel of the topic; every one must be readable for the topic to be.
+    pub decoders: BTreeMap<u16, Box<dyn Decoder>>,
+    /// Units in the metadata of its channels.
+    pub units: Vec<String>,
+    /// Why the topic is not readable.
+    pub fault: Option<Unreadable>,
+}
+
+/// All topics of a file by name.
+pub(super) fn readers(container: &Container) -> BTreeMap<String, Reader> {
+    let mut readers: BTreeMap<String, Reader> = BTreeMap::new();
+    for (id, channel) in &container.channels {
+        let schema = container.schemas.get(&channel.schema);
+        let (name, encoding) = schema.map_or(("", ""), |schema| (&schema.name, &schema.encoding));
+        let reader = readers.entry(channel.topic.clone()).or_insert_with(|| Reader {
+            topic: Topic {
+                name: channel.topic.clone(),
+                schema: name.into(),
+                schema_encoding: encoding.into(),
+                message_encoding: channel.encoding.clone(),
+                messages: 0,
+                log_time_ns: None,
+                markers: Ok(String::new()),
+            },
+            decoders: BTreeMap::new(),
+            units: Vec::new(),
+            fault: None,
+        });
+        if let Some(Traffic { messages, first, last }) = container.traffic.get(id).copied() {
+            let [start, end] = reader.topic.log_time_ns.unwrap_or([first, last]);
+            reader.topic.log_time_ns = Some([start.min(first), end.max(last)]);
+            reader.topic.messages += messages;
+        }
+        let units = ["unit", "units"].into_iter().filter_map(|key| channel.metadata.get(key));
+        reader.units.extend(units.cloned());
+        match format::decoder(schema, &channel.encoding) {
+            Ok((format, decoder)) => {
+                reader.decoders.insert(*id, decoder);
+                reader.topic.markers = reader.topic.markers.clone().map(|_| format.into());
+            }
+            Err(fault) => {
+                reader.topic.markers = Err(fault.to_string());
+                reader.fault = Some(fault);
+            }
+        }
+    }
+    readers
+}
