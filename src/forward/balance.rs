@@ -30,9 +30,12 @@ pub(super) struct Balance<'m> {
     target: Drive,
     /// Prescribed displacements at the target: (parameter, component, mm).
     prescribed: Vec<(usize, usize, f64)>,
-    /// The last evaluation, and what of the prescribed motion was outstanding then.
-    evaluation: Option<Evaluation>,
+    /// dPi/d(unknown) at the state last assessed, and the prescribed motion outstanding there.
+    residual: Vec<f64>,
     gap: Option<Vec<[f64; 3]>>,
+    /// The motion that was outstanding when the tangent was made, and K times it.
+    lifted_gap: Option<Vec<[f64; 3]>>,
+    lifted: Option<Vec<f64>>,
     worst: WorstPoint,
     work: Work,
 }
@@ -55,8 +58,10 @@ impl<'m> Balance<'m> {
             factored: false,
             target: Drive { controls: vec![0.0; model.controls().len()], load: 0.0 },
             prescribed: Vec::new(),
-            evaluation: None,
+            residual: Vec::new(),
             gap: None,
+            lifted_gap: None,
+            lifted: None,
             worst: WorstPoint { min: 1.0, element: 0, point: 0, max: 1.0 },
             work: Work { points: vec![0; terms], term_seconds: vec![0.0; terms], ..Work::default() },
         })
@@ -178,54 +183,90 @@ impl Equations for Balance<'_> {
     type State = State;
     type Step = Direction;
 
-    fn assess(&mut self, state: &State, linearise: bool) -> Assessment {
+    fn assess(&mut self, state: &State) -> Assessment {
         debug_assert!(state.controls == self.target.controls && state.load == self.target.load);
-        let gap = self.outstanding(state);
-        let want = if linearise { Want::Stiffness } else { Want::Force };
-        let evaluation = self.evaluate(state, want, gap.as_deref());
-        if linearise {
-            self.assemble();
-        }
+        let evaluation = self.evaluate(state, Want::Force, None);
+        self.gap = self.outstanding(state);
         self.worst = evaluation.det_f;
         let residual = self.norm(&evaluation.residual);
-        let assessment = Assessment {
+        self.residual = evaluation.residual;
+        Assessment {
             residual,
             required: self.tolerance * evaluation.magnitude + ROUNDING * self.model.force_scale(),
             admissible: evaluation.det_f.min > 0.0 && residual.is_finite(),
-            outstanding: gap.is_some(),
-        };
-        self.evaluation = Some(evaluation);
-        self.gap = gap;
-        assessment
+            outstanding: self.gap.is_some(),
+        }
     }
 
-    fn step(&mut self) -> Result<Direction> {
-        let Some(evaluation) = &self.evaluation else { return Err(Error::NotFactored) };
-        let mut unknowns: Vec<f64> =
-            evaluation.residual.iter().zip(&evaluation.lifted).map(|(r, k)| -(r + k)).collect();
+    fn step(&mut self, state: &State) -> Result<Direction> {
+        let gap = self.outstanding(state);
+        let evaluation = self.evaluate(state, Want::Stiffness, gap.as_deref());
+        self.assemble();
+        self.residual = evaluation.residual;
+        self.lifted = gap.as_ref().map(|_| evaluation.lifted);
+        self.lifted_gap = gap.clone();
+        self.gap = gap;
         self.factored = false;
         self.factor.refactor(&self.matrix)?;
         self.factored = true;
         self.work.iterations += 1;
+        self.correction()
+    }
+
+    /// K d = - (r + K g) with the motion g that is still outstanding, a part of what it was when K was made.
+    fn correction(&mut self) -> Result<Direction> {
+        let mut unknowns: Vec<f64> = self.residual.iter().map(|r| -r).collect();
+        if let (Some(gap), Some(first), Some(lifted)) = (&self.gap, &self.lifted_gap, &self.lifted) {
+            let part = remaining(gap, first);
+            unknowns.iter_mut().zip(lifted).for_each(|(d, k)| *d -= part * k);
+        }
         self.factor.solve(&self.matrix, &mut unknowns, 1, STEP_TOLERANCE)?;
-        Ok(Direction { unknowns, gap: self.gap.take() })
+        Ok(Direction { unknowns, gap: self.gap.clone() })
     }
 
     fn advance(&self, state: &State, step: &Direction, factor: f64) -> State {
         let mut next = state.clone();
         self.model.advance(&mut next, &step.unknowns, factor);
-        if step.gap.is_some() {
-            if factor == 1.0 {
-                // exactly, so that nothing is left outstanding by rounding
-                for &(parameter, component, value) in &self.prescribed {
+        if let Some(gap) = &step.gap {
+            for &(parameter, component, value) in &self.prescribed {
+                if factor == 1.0 {
+                    // exactly, so that nothing is left outstanding by rounding
                     next.u[parameter][component] = value;
-                }
-            } else if let Some(gap) = &step.gap {
-                for &(parameter, component, _) in &self.prescribed {
+                } else {
                     next.u[parameter][component] += factor * gap[parameter][component];
                 }
             }
         }
         next
     }
+
+    /// Root mean square of displacements over the element size and of pressures over the shear modulus.
+    fn size(&self, a: &Direction, weight: f64, b: &Direction) -> f64 {
+        let (displacement, pressure) = (self.model.element_size(), self.model.shear_modulus());
+        let sum = |k: usize| a.unknowns[k] + weight * b.unknowns[k];
+        let all: f64 = (0..a.unknowns.len()).map(|k| sum(k) * sum(k)).sum();
+        let numbering = self.model.numbering();
+        let p: f64 =
+            (0..numbering.pressures()).map(|index| sum(numbering.pressure_unknown(index))).map(|p| p * p).sum();
+        let mut squares = (all - p).max(0.0) / (displacement * displacement) + p / (pressure * pressure);
+        if let Some(gap) = &a.gap {
+            for (parameter, gap) in gap.iter().enumerate() {
+                for (component, gap) in gap.iter().enumerate() {
+                    let g = gap + weight * b.gap.as_ref().map_or(0.0, |b| b[parameter][component]);
+                    squares += g * g / (displacement * displacement);
+                }
+            }
+        }
+        (squares / a.unknowns.len().max(1) as f64).sqrt()
+    }
+}
+
+/// What part of the first gap is still outstanding: gaps shrink in proportion.
+fn remaining(gap: &[[f64; 3]], first: &[[f64; 3]]) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for (g, f) in gap.iter().flatten().zip(first.iter().flatten()) {
+        product += g * f;
+        square += f * f;
+    }
+    if square > 0.0 { product / square } else { 0.0 }
 }

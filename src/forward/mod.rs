@@ -11,6 +11,16 @@ use crate::term::Want;
 use balance::Balance;
 use std::time::Instant;
 
+/// First and longest step of a path, as changes of ln(activation + onset): the response is about even in it.
+const FIRST_STEP: f64 = 0.5;
+/// A Newton step that must be damped below this is left for a shorter step of the path.
+const DAMPING: f64 = 0.1;
+/// Below this length a step onto a saddle is believed.
+const SHORT_FOR_A_JUMP: f64 = 0.02;
+const LONGEST_STEP: f64 = 2.0;
+/// A support rotates by no more than this in one step, radians.
+const LARGEST_ROTATION: f64 = std::f64::consts::PI / 8.0;
+
 /// What drives a model to an equilibrium.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
@@ -151,13 +161,15 @@ impl<'m> Solver<'m> {
     /// [`Failure`] with the last equilibrium that was found on the path.
     pub fn equilibrium(&mut self, from: &State, to: &Drive) -> std::result::Result<Equilibrium, Box<Failure>> {
         let start = Drive { controls: from.controls.clone(), load: from.load };
-        let mut stepper = Stepper::new(StepLimits { max: self.settings.step_max, min: self.settings.step_min });
+        let (warp, limits) = self.walk(&start, to);
+        let mut stepper = Stepper::new(limits);
         let mut history: Vec<Step> = Vec::new();
         let mut last = from.clone();
         let mut before: Option<(f64, State)> = None;
-        let limits = Limits { iterations: self.settings.max_iterations, halvings: 12 };
+        let mut modes = 0;
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING };
         while let Some(place) = stepper.next() {
-            self.balance.set_target(between(&start, to, place));
+            self.balance.set_target(between(&start, to, warp.place(place)));
             let guess = match &before {
                 Some((earlier, state)) => self.balance.extrapolate(
                     state,
@@ -174,8 +186,13 @@ impl<'m> Solver<'m> {
                 }
             };
             match outcome.stop {
+                None if self.jumped(modes, stepper.length()) => {
+                    self.balance.count_cut();
+                    stepper.failed();
+                }
                 None => {
                     stepper.succeeded(place, outcome.iterations.len());
+                    modes = modes.max(self.balance.negative_modes().unwrap_or(0));
                     let earlier = history.last().map_or(0.0, |step| step.place);
                     history.push(Step {
                         place,
@@ -200,6 +217,27 @@ impl<'m> Solver<'m> {
         Ok(Equilibrium { state: last, evaluation, history, negative_modes })
     }
 
+    /// Whether a step has landed on a saddle though the path so far was stable: another branch was met, and a shorter
+    /// step will follow the own one. A step that is short already has found a real loss of stability.
+    fn jumped(&self, modes: usize, length: f64) -> bool {
+        length > SHORT_FOR_A_JUMP && self.balance.negative_modes().is_some_and(|now| now > modes)
+    }
+
+    /// How the path to `to` is walked, and in which steps.
+    fn walk(&self, from: &Drive, to: &Drive) -> (Warp, StepLimits) {
+        let model = self.balance.model;
+        let changes = model.controls().iter().zip(&from.controls).zip(&to.controls).map(|((control, a), b)| {
+            let above = |value: f64| (value - control.lower).max(0.0) + control.onset;
+            (above(*b) / above(*a)).ln()
+        });
+        let exponent = changes.fold(0.0, |most: f64, change| if change.abs() > most.abs() { change } else { most });
+        let angle = model.supports().largest_rotation() * (to.load - from.load).abs();
+        let rotation = LARGEST_ROTATION / angle.max(f64::MIN_POSITIVE);
+        let first = (FIRST_STEP / exponent.abs().max(f64::MIN_POSITIVE)).min(rotation);
+        let max = self.settings.step_max.min(LONGEST_STEP / exponent.abs().max(f64::MIN_POSITIVE)).min(rotation);
+        (Warp { exponent }, StepLimits { first, max, min: self.settings.step_min.min(max) })
+    }
+
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
     fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
         let guess = self.balance.at_target(guess);
@@ -214,9 +252,8 @@ impl<'m> Solver<'m> {
     fn not_converged(&self, stepper: &Stepper, stop: Stop, outcome: &Outcome<State>) -> Error {
         let reason = match stop {
             Stop::Inadmissible => "no admissible state to start from",
-            Stop::NoDescent => "no step keeps det F positive and lowers the residual",
+            Stop::NoDescent => "no step keeps det F positive and comes nearer",
             Stop::Iterations => "the iterations were used up",
-            Stop::Crawling => "only very short steps were possible",
         };
         let WorstPoint { min, element, point, .. } = self.balance.worst_point();
         Error::NotConverged {
@@ -239,6 +276,18 @@ impl<'m> Solver<'m> {
     /// Where the tangent cannot be factorised, or the refined solution does not reach 1e-9.
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
         self.balance.solve_with_tangent(state, rhs, columns)
+    }
+}
+
+/// Even steps along a path are even in ln(activation + onset) of the control that changes most:
+/// s(t) = (exp(c t) - 1) / (exp(c) - 1), or s = t where no control changes.
+struct Warp {
+    exponent: f64,
+}
+
+impl Warp {
+    fn place(&self, t: f64) -> f64 {
+        if self.exponent.abs() < 1e-3 || t == 1.0 { t } else { (self.exponent * t).exp_m1() / self.exponent.exp_m1() }
     }
 }
 

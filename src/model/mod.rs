@@ -29,6 +29,9 @@ pub struct Control {
     pub lower: f64,
     /// Largest admissible value.
     pub upper: f64,
+    /// The value at which the response begins to saturate: for an activation the tissue's shear modulus over
+    /// sigma_max. Steps of a path are even in ln(value + onset).
+    pub onset: f64,
 }
 
 /// What a model is made of.
@@ -129,6 +132,11 @@ impl Model {
     /// Reference volume of the tissue, mm3.
     pub fn volume(&self) -> f64 {
         self.ingredients.volume
+    }
+
+    /// Shear modulus of the tissue at rest, kPa.
+    pub fn shear_modulus(&self) -> f64 {
+        self.ingredients.shear_modulus
     }
 
     /// mu V^(2/3), mN: the force that strains the whole body by about one.

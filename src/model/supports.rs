@@ -91,9 +91,10 @@ impl Supports {
         self.supports.iter()
     }
 
-    /// Whether anything moves with the load factor.
-    pub fn move_with_load(&self) -> bool {
-        self.supports.iter().any(|s| matches!(s, Support::Rotate { angle, .. } if *angle != 0.0))
+    /// The largest angle by which a support rotates at full load, radians.
+    pub fn largest_rotation(&self) -> f64 {
+        let angle = |s: &Support| if let Support::Rotate { angle, .. } = s { angle.abs() } else { 0.0 };
+        self.supports.iter().map(angle).fold(0.0, f64::max)
     }
 
     /// The prescribed displacements at a load factor: (parameter, component, mm).

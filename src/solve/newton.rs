@@ -1,4 +1,11 @@
-//! Newton's method with an admissible region, a line search on the residual and prescribed motion that is taken along.
+//! Newton's method with an admissible region and an affine-invariant damping (Deuflhard, Newton Methods for Nonlinear
+//! Problems, 2004, algorithm NLEQ-ERR).
+//!
+//! A step d = - K^-1 r(x) is damped by a factor f until the natural monotonicity test holds:
+//!   theta = |c| / |d| < 1 - f/4,   c = - K^-1 r(x + f d)
+//! c is the correction that the old tangent K sees at the trial. Unlike a test on |r| it does not depend on how the
+//! equations are scaled, and it lets a slender body turn through the large residuals that full steps meet. Where K serves
+//! well (theta small at f = 1) the corrections are taken too: steps without a factorisation.
 
 use crate::error::Result;
 
@@ -6,17 +13,23 @@ use crate::error::Result;
 pub trait Equations {
     /// The unknowns, and whatever else moves with them.
     type State: Clone;
-    /// A search direction.
+    /// A direction in which a state can be moved.
     type Step;
 
-    /// Residual at a state. With `linearise` the derivative is kept for [`Equations::step`].
-    fn assess(&mut self, state: &Self::State, linearise: bool) -> Assessment;
+    /// Residual at a state.
+    fn assess(&mut self, state: &Self::State) -> Assessment;
 
-    /// The Newton step at the state last assessed with `linearise`, from a factorisation.
-    fn step(&mut self) -> Result<Self::Step>;
+    /// The Newton step at a state: a new tangent, factorised.
+    fn step(&mut self, state: &Self::State) -> Result<Self::Step>;
+
+    /// The correction at the state last assessed as the last factorised tangent sees it.
+    fn correction(&mut self) -> Result<Self::Step>;
 
     /// The state at `factor` along a step.
     fn advance(&self, state: &Self::State, step: &Self::Step, factor: f64) -> Self::State;
+
+    /// The size of a + weight b, dimensionless; a step of size one is large.
+    fn size(&self, a: &Self::Step, weight: f64, b: &Self::Step) -> f64;
 }
 
 /// What an assessment says.
@@ -43,8 +56,8 @@ impl Assessment {
 pub struct Limits {
     /// Newton iterations before giving up.
     pub iterations: usize,
-    /// Halvings of a step before giving up.
-    pub halvings: usize,
+    /// The smallest damping factor before giving up.
+    pub damping: f64,
 }
 
 /// One iteration.
@@ -56,6 +69,8 @@ pub struct Iteration {
     pub required: f64,
     /// Part of the full step that was taken.
     pub factor: f64,
+    /// Corrections with the same tangent that followed.
+    pub corrections: usize,
 }
 
 /// Why the iteration ended without a solution.
@@ -63,12 +78,10 @@ pub struct Iteration {
 pub enum Stop {
     /// The first state was not admissible.
     Inadmissible,
-    /// No step along the Newton direction was admissible and reduced the residual.
+    /// No step along the Newton direction was admissible and passed the monotonicity test.
     NoDescent,
     /// The iterations were used up.
     Iterations,
-    /// The iteration crawled: several short steps in a row.
-    Crawling,
 }
 
 /// A solution, or how far the iteration came.
@@ -84,23 +97,19 @@ pub struct Outcome<S> {
     pub stop: Option<Stop>,
 }
 
-/// Steps shorter than this in a row mean that the iteration crawls.
-const SHORT: f64 = 0.1;
-/// How many of them.
-const SHORT_IN_A_ROW: usize = 4;
+/// Corrections with an old tangent go on while each is smaller than the one before by this factor.
+const CONTRACTION: f64 = 0.1;
 
 /// Iterates from `start` until the residual is as small as required.
 ///
-/// Each iteration solves K d = - r. The step is halved until the state is admissible and the residual falls; while
-/// prescribed motion is outstanding, which comes with the step in proportion, admissible is enough.
-///
 /// # Errors
-/// Where the tangent cannot be factorised.
+/// Where a tangent cannot be factorised.
 pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) -> Result<Outcome<E::State>> {
     let mut state = start;
     let mut iterations = Vec::new();
-    let mut short = 0;
-    let mut now = equations.assess(&state, false);
+    let mut now = equations.assess(&state);
+    // the last step with its factor, and the correction that its tangent saw at its end
+    let mut previous: Option<(E::Step, f64, E::Step)> = None;
     let stop = loop {
         if now.converged() {
             break None;
@@ -111,28 +120,77 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
         if iterations.len() >= limits.iterations {
             break Some(Stop::Iterations);
         }
-        equations.assess(&state, true);
-        let step = equations.step()?;
+        let step = equations.step(&state)?;
+        let length = equations.size(&step, 0.0, &step);
+        // the a-priori factor: how far the last tangent could be trusted
         let mut factor = 1.0;
-        let mut accepted = None;
-        for _ in 0..=limits.halvings {
+        if let Some((last, last_factor, correction)) = &previous {
+            let change = equations.size(correction, -1.0, &step);
+            let trust = equations.size(last, 0.0, last) * equations.size(correction, 0.0, correction) * last_factor
+                / (change * length);
+            if trust.is_finite() {
+                factor = trust.clamp(limits.damping, 1.0);
+            }
+        }
+        let mut accepted: Option<(E::State, Assessment, E::Step, f64)> = None;
+        loop {
             let trial = equations.advance(&state, &step, factor);
-            let then = equations.assess(&trial, false);
-            // at least a tenth of the decrease that the linear model promises
-            let falls = then.residual <= (1.0 - 0.1 * factor) * now.residual;
-            if then.admissible && (falls || now.outstanding || then.converged()) {
-                accepted = Some((trial, then));
+            let then = equations.assess(&trial);
+            if !then.admissible {
+                if let Some((.., smaller)) = &accepted {
+                    // the longer step that was tried for good measure is no good: keep the shorter one
+                    factor = *smaller;
+                    break;
+                }
+                factor *= 0.5;
+                if factor < limits.damping {
+                    break;
+                }
+                continue;
+            }
+            let correction = equations.correction()?;
+            let theta = equations.size(&correction, 0.0, &correction) / length;
+            // c - (1 - f) d is the part of the correction that is due to curvature
+            let curvature = equations.size(&correction, factor - 1.0, &step);
+            let better = (0.5 * length * factor * factor / curvature).min(1.0);
+            if theta < 1.0 - 0.25 * factor || then.converged() {
+                let longer = better >= 4.0 * factor && accepted.is_none();
+                accepted = Some((trial, then, correction, factor));
+                if !longer {
+                    break;
+                }
+                factor = better;
+            } else if let Some((.., smaller)) = &accepted {
+                factor = *smaller;
+                break;
+            } else {
+                factor = better.min(0.5 * factor);
+                if factor.is_nan() || factor < limits.damping {
+                    break;
+                }
+            }
+        }
+        let Some((trial, then, correction, _)) = accepted else { break Some(Stop::NoDescent) };
+        let mut iteration = Iteration { residual: now.residual, required: now.required, factor, corrections: 0 };
+        (state, now) = (trial, then);
+        let mut correction = correction;
+        let mut last_size = length;
+        while factor == 1.0 && !now.converged() {
+            let size = equations.size(&correction, 0.0, &correction);
+            if size > CONTRACTION * last_size {
                 break;
             }
-            factor *= 0.5;
+            let trial = equations.advance(&state, &correction, 1.0);
+            let then = equations.assess(&trial);
+            if !then.admissible || then.residual > now.residual {
+                break;
+            }
+            correction = equations.correction()?;
+            iteration.corrections += 1;
+            (state, now, last_size) = (trial, then, size);
         }
-        let Some((trial, then)) = accepted else { break Some(Stop::NoDescent) };
-        iterations.push(Iteration { residual: now.residual, required: now.required, factor });
-        (state, now) = (trial, then);
-        short = if factor < SHORT { short + 1 } else { 0 };
-        if short >= SHORT_IN_A_ROW {
-            break Some(Stop::Crawling);
-        }
+        iterations.push(iteration);
+        previous = (iteration.corrections == 0).then_some((step, factor, correction));
     };
     Ok(Outcome { state, last: now, iterations, stop })
 }

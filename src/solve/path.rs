@@ -3,7 +3,9 @@
 /// Lengths of steps along a path from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepLimits {
-    /// The first and longest step.
+    /// The first step.
+    pub first: f64,
+    /// The longest step.
     pub max: f64,
     /// The shortest step; a shorter one means failure.
     pub min: f64,
@@ -19,13 +21,10 @@ pub struct Stepper {
     cuts: usize,
 }
 
-/// Iterations with which a step is as long as it should be.
-const EASY: usize = 6;
-
 impl Stepper {
     /// At the beginning of a path.
     pub fn new(limits: StepLimits) -> Stepper {
-        Stepper { limits, reached: 0.0, length: limits.max.min(1.0), cuts: 0 }
+        Stepper { limits, reached: 0.0, length: limits.first.min(limits.max).min(1.0), cuts: 0 }
     }
 
     /// The place on the path where the last solution is.
@@ -49,17 +48,18 @@ impl Stepper {
         self.reached = place;
         // hard steps are followed by shorter ones, easy ones by longer ones
         let factor = match iterations {
-            0..=EASY => 2.5,
-            7..=10 => 1.5,
-            _ => 1.0,
+            0..=3 => 2.0,
+            4..=5 => 1.4,
+            6..=7 => 1.0,
+            _ => 0.7,
         };
-        self.length = (taken.max(self.length.min(taken * 2.0)) * factor).min(self.limits.max);
+        self.length = (taken * factor).min(self.limits.max);
     }
 
     /// The step failed; `false` when no shorter step is allowed.
     pub fn failed(&mut self) -> bool {
         self.cuts += 1;
-        self.length *= if self.cuts == 1 { 0.125 } else { 0.25 };
+        self.length *= 0.4;
         self.length >= self.limits.min
     }
 

@@ -149,7 +149,7 @@ fn energy_residual_tangent_and_activation_force_agree() {
         let tissue = Tissue::new(&mesh, TISSUE, how.kappa, how.space, how.gauss).expect("sound geometry");
         let volume = tissue.volume();
         let mut terms: Vec<Box<dyn Term>> = vec![Box::new(tissue)];
-        let control = |name: &str| Control { name: name.into(), lower: 0.0, upper: 1.0 };
+        let control = |name: &str| Control { name: name.into(), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 };
         for muscle in embedded(&reference, &mesh) {
             terms.push(Box::new(muscle));
         }

@@ -58,7 +58,7 @@ pub fn model(
     for (index, (name, muscle, angles)) in muscles.into_iter().enumerate() {
         let muscle = Muscle::new(name, &mesh, &locator, &muscle, &angles, 3, FIBRE, index).expect("embedded");
         terms.push(Box::new(muscle));
-        controls.push(Control { name: name.to_owned(), lower: 0.0, upper: 1.0 });
+        controls.push(Control { name: name.to_owned(), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 });
     }
     terms.extend(loads);
     let supports = Supports::new(&mesh, supports).expect("supports agree");
