@@ -341,7 +341,110 @@ pub enum Error {
         labels: usize,
     },
     // ---- K: markers against the model -----------------------------------------------------------------
+    /// The recording is larger or smaller than the model by a power of ten that a wrong unit explains.
+    #[error(
+        "marker units look wrong: over {labels} matched labels the recording, read as {declared}, is {ratio:.3} times the size of the model (nothing was converted)"
+    )]
+    UnitsLookWrong {
+        /// Size of the recording over size of the model.
+        ratio: f64,
+        /// Labels compared.
+        labels: usize,
+        /// The unit in the problem file.
+        declared: &'static str,
+        /// The unit that would explain the ratio.
+        likely: &'static str,
+        /// The unit in the problem file.
+        place: Box<Place>,
+    },
+    /// A marker of the problem is not in the recording.
+    #[error("the recording has no marker `{name}`; its labels are {labels}")]
+    UnknownLabel {
+        /// The marker's name.
+        name: Box<str>,
+        /// The first labels of the recording.
+        labels: Box<str>,
+        /// The label that is nearest in spelling.
+        nearest: Option<Box<str>>,
+        /// The marker in the problem file.
+        place: Box<Place>,
+    },
+    /// A marker lies far from the surface of the host.
+    #[error(
+        "marker `{name}` is {distance:.2} mm from the surface of the host, more than max_marker_distance_mm = {limit}"
+    )]
+    MarkerFarFromSurface {
+        /// The marker's name.
+        name: Box<str>,
+        /// Distance to the surface, mm.
+        distance: f64,
+        /// The limit, mm.
+        limit: f64,
+        /// The foot on the surface, mm.
+        foot: [f64; 3],
+        /// The marker in the problem file.
+        place: Box<Place>,
+    },
     // ---- G: geometry ----------------------------------------------------------------------------------
+    /// The reference geometry of the host is inverted.
+    #[error("the mesh is inverted: element {element} at xi ({:.3}, {:.3}, {:.3}) has det(dX/dxi) = {det:.3e} mm3", xi[0], xi[1], xi[2])]
+    InvertedMesh {
+        /// Element index.
+        element: usize,
+        /// Local coordinates of the worst quadrature point.
+        xi: [f64; 3],
+        /// det(dX/dxi) there, mm3.
+        det: f64,
+        /// The mesh in the problem file.
+        place: Box<Place>,
+    },
+    /// Quadrature points of a muscle lie outside the host.
+    #[error("muscle `{}`: {} of its {} quadrature points lie outside the host, the farthest by {:.3} mm: element {} near ({:.2}, {:.2}, {:.2}) mm", .0.muscle, .0.count, .0.of, .0.distance, .0.element, .0.position[0], .0.position[1], .0.position[2])]
+    MuscleOutside(Box<MuscleOutside>),
+    /// An element of a muscle's own mesh is inverted.
+    #[error("muscle `{muscle}`: element {element} of its mesh is inverted: det(dX/deta) = {det:.3e} mm3")]
+    InvertedMuscle {
+        /// Its name.
+        muscle: Box<str>,
+        /// Element of the muscle.
+        element: usize,
+        /// det(dX/deta), mm3.
+        det: f64,
+        /// The muscle in the problem file.
+        place: Box<Place>,
+    },
+    /// A probe lies outside the host.
+    #[error("probe `{name}` lies outside the host, {distance:.3} mm from its nearest point ({:.3}, {:.3}, {:.3}) mm", nearest[0], nearest[1], nearest[2])]
+    ProbeOutside {
+        /// Its name.
+        name: Box<str>,
+        /// Distance to the host, mm.
+        distance: f64,
+        /// The nearest point, mm.
+        nearest: [f64; 3],
+        /// The probe in the problem file.
+        place: Box<Place>,
+    },
+    /// Two supports prescribe different motions where they meet.
+    #[error("two supports prescribe different motions at node {node}, ({:.2}, {:.2}, {:.2}) mm; the other one is at {other}", position[0], position[1], position[2])]
+    SupportsDisagree {
+        /// The node where they meet.
+        node: usize,
+        /// Its position, mm.
+        position: [f64; 3],
+        /// The first of the two in the problem file.
+        other: Box<Place>,
+        /// The second.
+        place: Box<Place>,
+    },
+    /// A symmetry support on a face that is not normal to an axis.
+    #[error("face `{face}` does not lie in a plane normal to a coordinate axis, so it cannot be a symmetry plane")]
+    NotNormalToAxis {
+        /// The face.
+        face: Box<str>,
+        /// The support in the problem file.
+        place: Box<Place>,
+    },
     // ---- S: solver ------------------------------------------------------------------------------------
     /// The factorisation met a pivot that is not a finite number.
     #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
@@ -399,6 +502,36 @@ pub enum Error {
         required: f64,
     },
     // ---- F: fit ---------------------------------------------------------------------------------------
+    /// Clarabel did not solve the quadratic program of a step.
+    #[error("the bounded step of the fit was not solved: the quadratic program ended as {status}")]
+    StepNotSolved {
+        /// Clarabel's status by name.
+        status: &'static str,
+    },
+    /// The fit of a frame did not converge.
+    #[error(
+        "frame {frame}: the fit did not converge in {iterations} iterations ({reason}); last step {step:.1e}, required {required:.1e}"
+    )]
+    FitNotConverged {
+        /// Frame of the recording.
+        frame: usize,
+        /// Gauss-Newton iterations.
+        iterations: usize,
+        /// Why it ended.
+        reason: &'static str,
+        /// Largest change of a control in the last step.
+        step: f64,
+        /// The change at which the fit counts as converged.
+        required: f64,
+    },
+    /// A frame has too few markers.
+    #[error("frame {frame} at {time_s:.3} s has no marker at all")]
+    NoMarkersInFrame {
+        /// Frame of the recording.
+        frame: usize,
+        /// Its time, s.
+        time_s: f64,
+    },
     // ---- O: output ------------------------------------------------------------------------------------
     /// A file could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
@@ -457,12 +590,24 @@ impl Error {
             Error::Undecodable { .. } => "M011",
             Error::UnsupportedEncapsulation { .. } => "M012",
             Error::FrameShape { .. } => "M013",
+            Error::UnitsLookWrong { .. } => "K001",
+            Error::UnknownLabel { .. } => "K002",
+            Error::MarkerFarFromSurface { .. } => "K003",
+            Error::InvertedMesh { .. } => "G001",
+            Error::MuscleOutside(_) => "G002",
+            Error::InvertedMuscle { .. } => "G003",
+            Error::ProbeOutside { .. } => "G004",
+            Error::SupportsDisagree { .. } => "G005",
+            Error::NotNormalToAxis { .. } => "G006",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
             Error::Singular { .. } => "S010",
             Error::FactorTooLarge { .. } => "S011",
             Error::NotFactored => "S012",
+            Error::StepNotSolved { .. } => "F001",
+            Error::FitNotConverged { .. } => "F002",
+            Error::NoMarkersInFrame { .. } => "F003",
             Error::Io { .. } => "O001",
         }
     }
@@ -520,6 +665,32 @@ impl Error {
                 Some("record with a ROS 2 middleware that writes plain CDR, as rosbag2 does by default".into())
             }
             Error::FrameShape { .. } => Some("give every frame one position, or `None`, per label".into()),
+            Error::UnitsLookWrong { likely, .. } => Some(format!("the data fit units = \"{likely}\"")),
+            Error::UnknownLabel { nearest: Some(nearest), .. } => Some(format!("did you mean `{nearest}`?")),
+            Error::UnknownLabel { .. } => Some("rename the marker, or remove it from the problem".into()),
+            Error::MarkerFarFromSurface { foot, .. } => Some(format!(
+                "its nearest point on the surface is position_mm = [{:.3}, {:.3}, {:.3}]; or raise fit.max_marker_distance_mm",
+                foot[0], foot[1], foot[2]
+            )),
+            Error::InvertedMesh { .. } => Some("check sizes and the order of nodes: sizes must be positive".into()),
+            Error::MuscleOutside(_) => Some("move or shrink the muscle until it lies inside the host".into()),
+            Error::InvertedMuscle { .. } => Some("check the muscle's size and the order of its nodes".into()),
+            Error::ProbeOutside { nearest, .. } => Some(format!(
+                "the nearest material point is position_mm = [{:.3}, {:.3}, {:.3}]",
+                nearest[0], nearest[1], nearest[2]
+            )),
+            Error::SupportsDisagree { .. } => Some("keep one of the two, or choose faces that do not meet".into()),
+            Error::NotNormalToAxis { .. } => {
+                Some("turn the geometry so that the plane is normal to x, y or z".into())
+            }
+            Error::StepNotSolved { .. } => {
+                Some("scale the problem: give realistic sd_mm, and remove unknowns that no marker sees".into())
+            }
+            Error::FitNotConverged { .. } => Some(
+                "raise fit.max_iterations, or look at the residuals: do the labels and positions belong together?"
+                    .into(),
+            ),
+            Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
             Error::NotFinite => None,
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
@@ -555,6 +726,15 @@ impl Error {
             | Error::MissingFile { place, .. }
             | Error::BadOverride { place, .. }
             | Error::TimeOrder { place, .. } => Some(place),
+            Error::InvertedMesh { place, .. }
+            | Error::InvertedMuscle { place, .. }
+            | Error::ProbeOutside { place, .. }
+            | Error::SupportsDisagree { place, .. }
+            | Error::NotNormalToAxis { place, .. }
+            | Error::UnitsLookWrong { place, .. }
+            | Error::UnknownLabel { place, .. }
+            | Error::MarkerFarFromSurface { place, .. } => Some(place),
+            Error::MuscleOutside(details) => Some(&details.place),
             _ => None,
         }
     }
@@ -567,6 +747,25 @@ impl Error {
             _ => 3,
         }
     }
+}
+
+/// Details of [`Error::MuscleOutside`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct MuscleOutside {
+    /// Its name.
+    pub muscle: String,
+    /// How many points lie outside.
+    pub count: usize,
+    /// Of how many.
+    pub of: usize,
+    /// Element of the muscle with the farthest point.
+    pub element: usize,
+    /// That point, mm.
+    pub position: [f64; 3],
+    /// Its distance to the host, mm.
+    pub distance: f64,
+    /// The muscle in the problem file.
+    pub place: Place,
 }
 
 /// A mistake as a line of a list.
