@@ -532,6 +532,12 @@ pub enum Error {
         /// Its time, s.
         time_s: f64,
     },
+    /// The optimiser stopped for a reason of its own.
+    #[error("the optimiser stopped: {message}")]
+    Optimiser {
+        /// What it said.
+        message: String,
+    },
     // ---- O: output ------------------------------------------------------------------------------------
     /// A file could not be read or written.
     #[error("cannot {action} {}: {source}", path.display())]
@@ -608,6 +614,7 @@ impl Error {
             Error::StepNotSolved { .. } => "F001",
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
+            Error::Optimiser { .. } => "F004",
             Error::Io { .. } => "O001",
         }
     }
@@ -691,7 +698,7 @@ impl Error {
                     .into(),
             ),
             Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
-            Error::NotFinite => None,
+            Error::Optimiser { .. } | Error::NotFinite => None,
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
             }

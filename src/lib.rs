@@ -4,6 +4,7 @@
 
 pub mod cli;
 pub mod error;
+pub mod fit;
 pub mod forward;
 pub mod markers;
 pub mod material;

@@ -22,7 +22,7 @@ const STALE_SWEEPS: usize = 12;
 /// A model with the memory to solve it.
 pub(super) struct Balance<'m> {
     pub model: &'m Model,
-    tolerance: f64,
+    pub tolerance: f64,
     workspace: Workspace,
     matrix: SymmetricMatrix,
     factor: Factor,

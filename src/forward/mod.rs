@@ -5,7 +5,7 @@ mod balance;
 use crate::error::{Error, Result};
 use crate::math::factor;
 use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
-use crate::solve::newton::{Iteration, Limits, Outcome, Stop, newton};
+use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
 use balance::Balance;
@@ -15,6 +15,8 @@ use std::time::Instant;
 const FIRST_STEP: f64 = 0.5;
 /// A Newton step that must be damped below this is left for a shorter step of the path.
 const DAMPING: f64 = 0.1;
+/// Iterations that a guess is given before the path is walked instead.
+const NEAR_ITERATIONS: usize = 8;
 /// Below this length a step onto a saddle is believed.
 const SHORT_FOR_A_JUMP: f64 = 0.02;
 const LONGEST_STEP: f64 = 2.0;
@@ -150,9 +152,43 @@ impl<'m> Solver<'m> {
         self.balance.model
     }
 
+    /// How equilibria are sought.
+    pub fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Seeks the next equilibria in another way.
+    pub fn set_settings(&mut self, settings: Settings) {
+        self.balance.tolerance = settings.tolerance;
+        self.settings = settings;
+    }
+
     /// Work done since the solver was made.
     pub fn work(&self) -> Work {
         self.balance.work()
+    }
+
+    /// The equilibrium at `to`, sought from a guess of it: a state whose unknowns are near. Where that fails, along the
+    /// path from the equilibrium `from`.
+    ///
+    /// # Errors
+    /// As [`Solver::equilibrium`].
+    pub fn equilibrium_near(
+        &mut self,
+        guess: &State,
+        from: &State,
+        to: &Drive,
+    ) -> std::result::Result<Equilibrium, Box<Failure>> {
+        self.balance.set_target(to.clone());
+        let guess = self.balance.at_target(guess.clone());
+        let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), damping: DAMPING };
+        if let Ok(outcome) = newton(&mut self.balance, guess, limits) {
+            let stable = self.balance.negative_modes().unwrap_or(0) == 0;
+            if outcome.stop.is_none() && stable {
+                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+            }
+        }
+        self.equilibrium(from, to)
     }
 
     /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`.
@@ -194,12 +230,7 @@ impl<'m> Solver<'m> {
                     stepper.succeeded(place, outcome.iterations.len());
                     modes = modes.max(self.balance.negative_modes().unwrap_or(0));
                     let earlier = history.last().map_or(0.0, |step| step.place);
-                    history.push(Step {
-                        place,
-                        residual: outcome.last.residual,
-                        required: outcome.last.required,
-                        iterations: outcome.iterations,
-                    });
+                    history.push(step(place, outcome.last, outcome.iterations));
                     before = Some((earlier, std::mem::replace(&mut last, outcome.state)));
                 }
                 Some(stop) => {
@@ -212,9 +243,12 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        let evaluation = self.balance.evaluation_at(&last);
-        let negative_modes = self.balance.negative_modes();
-        Ok(Equilibrium { state: last, evaluation, history, negative_modes })
+        Ok(self.finish(last, history))
+    }
+
+    fn finish(&mut self, state: State, history: Vec<Step>) -> Equilibrium {
+        let evaluation = self.balance.evaluation_at(&state);
+        Equilibrium { state, evaluation, history, negative_modes: self.balance.negative_modes() }
     }
 
     /// Whether a step has landed on a saddle though the path so far was stable: another branch was met, and a shorter
@@ -277,6 +311,10 @@ impl<'m> Solver<'m> {
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
         self.balance.solve_with_tangent(state, rhs, columns)
     }
+}
+
+fn step(place: f64, last: Assessment, iterations: Vec<Iteration>) -> Step {
+    Step { place, iterations, residual: last.residual, required: last.required }
 }
 
 /// Even steps along a path are even in ln(activation + onset) of the control that changes most:

@@ -257,6 +257,22 @@ impl Model {
         self.mesh().parameters.iter().zip(&state.u).map(add).collect()
     }
 
+    /// The unknowns of a state in the order of the linear system.
+    pub fn unknowns(&self, state: &State) -> Vec<f64> {
+        let mut x = vec![0.0; self.numbering.unknowns()];
+        for (parameter, u) in state.u.iter().enumerate() {
+            for (component, u) in u.iter().enumerate() {
+                if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                    x[unknown] = *u;
+                }
+            }
+        }
+        for (index, p) in state.p.iter().enumerate() {
+            x[self.numbering.pressure_unknown(index)] = *p;
+        }
+        x
+    }
+
     /// Adds `factor` x `direction` (one entry per unknown) to the unknowns of a state.
     pub fn advance(&self, state: &mut State, direction: &[f64], factor: f64) {
         for (parameter, u) in state.u.iter_mut().enumerate() {

@@ -1,0 +1,124 @@
+//! The step of the fit: a convex quadratic program in a box, solved by Clarabel.
+//!
+//!   minimise 1/2 d^T H d + g^T d,   lower <= d <= upper
+
+use crate::error::{Error, Result};
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
+use nalgebra::DMatrix;
+
+/// An entry this close to a bound, in parts of the width of the box, lies on it: an interior-point method only comes near.
+const ON_BOUND: f64 = 1e-7;
+
+/// The minimiser of the quadratic program. `h` is symmetric and positive semidefinite; the box must not be empty.
+///
+/// # Errors
+/// [`Error::StepNotSolved`] with Clarabel's status by name unless that is Solved.
+pub fn bounded_step(h: &DMatrix<f64>, g: &[f64], lower: &[f64], upper: &[f64]) -> Result<Vec<f64>> {
+    let n = g.len();
+    if n == 0 {
+        return Ok(Vec::new());
+    }
+    // Clarabel's tolerances are absolute: bring the problem to unit size
+    let scale = (0..n).map(|i| h[(i, i)]).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let (mut columns, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
+    for j in 0..n {
+        for i in 0..=j {
+            rows.push(i);
+            values.push(h[(i, j)] / scale);
+        }
+        columns.push(rows.len());
+    }
+    let p = CscMatrix::new(n, n, columns, rows, values);
+    let q: Vec<f64> = g.iter().map(|g| g / scale).collect();
+    // d + s = upper, - d + s = - lower, s >= 0
+    let a = CscMatrix::new(
+        2 * n,
+        n,
+        (0..=n).map(|j| 2 * j).collect(),
+        (0..n).flat_map(|j| [j, n + j]).collect(),
+        (0..n).flat_map(|_| [1.0, -1.0]).collect(),
+    );
+    let b: Vec<f64> = upper.iter().copied().chain(lower.iter().map(|l| -l)).collect();
+    let settings = DefaultSettingsBuilder::default()
+        .verbose(false)
+        .max_threads(1)
+        .tol_gap_abs(1e-12)
+        .tol_gap_rel(1e-12)
+        .tol_feas(1e-12)
+        .build()
+        .map_err(|_| Error::StepNotSolved { status: "InvalidSettings" })?;
+    let mut solver = DefaultSolver::new(&p, &q, &a, &b, &[NonnegativeConeT(2 * n)], settings)
+        .map_err(|_| Error::StepNotSolved { status: "InvalidProblem" })?;
+    solver.solve();
+    let status = solver.solution.status;
+    if status != SolverStatus::Solved {
+        return Err(Error::StepNotSolved { status: name(status) });
+    }
+    let on_bound = |d: f64, l: f64, u: f64| {
+        let close = ON_BOUND * (u - l);
+        if d - l <= close {
+            l
+        } else if u - d <= close {
+            u
+        } else {
+            d
+        }
+    };
+    Ok(solver.solution.x.iter().zip(lower).zip(upper).map(|((d, l), u)| on_bound(*d, *l, *u)).collect())
+}
+
+/// Every status of Clarabel by name.
+fn name(status: SolverStatus) -> &'static str {
+    match status {
+        SolverStatus::Unsolved => "Unsolved",
+        SolverStatus::Solved => "Solved",
+        SolverStatus::PrimalInfeasible => "PrimalInfeasible",
+        SolverStatus::DualInfeasible => "DualInfeasible",
+        SolverStatus::AlmostSolved => "AlmostSolved",
+        SolverStatus::AlmostPrimalInfeasible => "AlmostPrimalInfeasible",
+        SolverStatus::AlmostDualInfeasible => "AlmostDualInfeasible",
+        SolverStatus::MaxIterations => "MaxIterations",
+        SolverStatus::MaxTime => "MaxTime",
+        SolverStatus::NumericalError => "NumericalError",
+        SolverStatus::InsufficientProgress => "InsufficientProgress",
+        SolverStatus::CallbackTerminated => "CallbackTerminated",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The solution satisfies the optimality conditions: the gradient vanishes inside and points outwards on bounds.
+    #[test]
+    fn satisfies_the_optimality_conditions() {
+        let mut seed = 7_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        for n in [1, 2, 5, 30] {
+            for size in [1e-6, 1.0, 1e6] {
+                let j = DMatrix::from_fn(2 * n, n, |_, _| size * random());
+                let h = j.tr_mul(&j);
+                let g: Vec<f64> = (0..n).map(|_| size * size * random()).collect();
+                let (lower, upper) = (vec![-0.1; n], vec![0.3; n]);
+                let d = bounded_step(&h, &g, &lower, &upper).expect("solved");
+                for i in 0..n {
+                    let slope = g[i] + (0..n).map(|k| h[(i, k)] * d[k]).sum::<f64>();
+                    let allowed = 1e-6 * h[(i, i)];
+                    assert!((lower[i]..=upper[i]).contains(&d[i]));
+                    assert!(d[i] == lower[i] || slope <= allowed, "n {n} size {size}: {slope:e}");
+                    assert!(d[i] == upper[i] || slope >= -allowed, "n {n} size {size}: {slope:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_problem_that_cannot_be_solved_is_an_error() {
+        let h = DMatrix::from_element(1, 1, f64::NAN);
+        assert!(matches!(bounded_step(&h, &[1.0], &[0.0], &[1.0]), Err(Error::StepNotSolved { .. })));
+    }
+}

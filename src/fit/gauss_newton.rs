@@ -1,0 +1,188 @@
+//! Gauss-Newton with bounds and a trust region, as an argmin solver.
+//!
+//! The response to an activation is about even in t = ln(1 + (q - lower) / onset): steps are made in t. With S = dq/dt,
+//! H = S J^T J S and g = S J^T r each iteration solves
+//!   minimise 1/2 d^T H d + g^T d,   bounds of t,   |d_i| <= trust
+//! and takes the step if the true objective falls as the model says, else shrinks the trust region.
+
+use super::bounded_step::bounded_step;
+use crate::error::Error;
+use argmin::core::{
+    Error as ArgminError, IterState, Jacobian, KV, Operator, Problem, Solver, State, TerminationReason,
+    TerminationStatus,
+};
+use argmin::kv;
+use nalgebra::{DMatrix, DVector};
+
+/// argmin's state for this solver: parameters, gradient, Jacobian, residuals.
+pub type GaussNewtonState = IterState<Vec<f64>, Vec<f64>, DMatrix<f64>, (), Vec<f64>, f64>;
+
+/// A control that is sought.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Smallest value.
+    pub lower: f64,
+    /// Largest value.
+    pub upper: f64,
+    /// Value above the lower bound at which the response begins to saturate.
+    pub onset: f64,
+}
+
+impl Range {
+    fn to_even(self, q: f64) -> f64 {
+        ((q - self.lower) / self.onset).ln_1p()
+    }
+
+    fn from_even(self, t: f64) -> f64 {
+        (self.lower + self.onset * t.exp_m1()).clamp(self.lower, self.upper)
+    }
+}
+
+/// The solver.
+pub struct GaussNewton {
+    ranges: Vec<Range>,
+    /// Largest change of a control at which the fit counts as converged.
+    tolerance: f64,
+    /// Largest change of t in one step.
+    trust: f64,
+    /// Largest change of a control in the last step.
+    step: f64,
+}
+
+/// First trust region: a factor e^2 in (activation + onset).
+const FIRST_TRUST: f64 = 2.0;
+/// A step must bring at least this part of what the model promises.
+const SUFFICIENT: f64 = 1e-4;
+/// The trust region is not shrunk below this.
+const SMALLEST_TRUST: f64 = 1e-10;
+/// Part of the largest curvature that holds controls still which no marker sees.
+const STILL: f64 = 1e-11;
+
+impl GaussNewton {
+    /// For controls with the given ranges.
+    pub fn new(ranges: Vec<Range>, tolerance: f64) -> GaussNewton {
+        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, step: f64::INFINITY }
+    }
+}
+
+impl<O> Solver<O, GaussNewtonState> for GaussNewton
+where
+    O: Operator<Param = Vec<f64>, Output = Vec<f64>> + Jacobian<Param = Vec<f64>, Jacobian = DMatrix<f64>>,
+{
+    fn name(&self) -> &str {
+        "Gauss-Newton with bounds"
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: GaussNewtonState,
+    ) -> Result<(GaussNewtonState, Option<KV>), ArgminError> {
+        let q = state.take_param().ok_or_else(|| ArgminError::msg("a fit starts from initial controls"))?;
+        let q: Vec<f64> = q.iter().zip(&self.ranges).map(|(q, r)| q.clamp(r.lower, r.upper)).collect();
+        let residuals = residuals(problem, &q)?;
+        let jacobian = jacobian(problem, &q)?;
+        let cost = cost(&residuals);
+        Ok((state.param(q).residuals(residuals).jacobian(jacobian).cost(cost), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: GaussNewtonState,
+    ) -> Result<(GaussNewtonState, Option<KV>), ArgminError> {
+        let missing = || ArgminError::msg("the state of the fit is incomplete");
+        let q = state.take_param().ok_or_else(missing)?;
+        let r = state.take_residuals().ok_or_else(missing)?;
+        let j = state.take_jacobian().ok_or_else(missing)?;
+        let before = state.get_cost();
+        let n = q.len();
+
+        let slopes: Vec<f64> = q.iter().zip(&self.ranges).map(|(q, r)| q - r.lower + r.onset).collect();
+        let scaled = DMatrix::from_fn(j.nrows(), n, |row, k| j[(row, k)] * slopes[k]);
+        let g: DVector<f64> = scaled.tr_mul(&DVector::from_column_slice(&r));
+        let mut h = scaled.tr_mul(&scaled);
+        let still = STILL * h.diagonal().amax();
+        for k in 0..n {
+            h[(k, k)] += still;
+        }
+        let t: Vec<f64> = q.iter().zip(&self.ranges).map(|(q, r)| r.to_even(*q)).collect();
+
+        let mut rejected = 0_u64;
+        loop {
+            let lower: Vec<f64> = t.iter().map(|t| (-t).max(-self.trust)).collect();
+            let upper: Vec<f64> =
+                t.iter().zip(&self.ranges).map(|(t, r)| (r.to_even(r.upper) - t).max(0.0).min(self.trust)).collect();
+            let d = bounded_step(&h, g.as_slice(), &lower, &upper)?;
+            let trial: Vec<f64> = (0..n).map(|k| self.ranges[k].from_even(t[k] + d[k])).collect();
+            self.step = trial.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let d = DVector::from_vec(d);
+            let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));
+            let last = self.step <= self.tolerance;
+
+            let outcome = residuals(problem, &trial);
+            let after = match &outcome {
+                Ok(residuals) => cost(residuals),
+                // a step beyond what the forward model can follow is too long, not the end
+                Err(error) if !last && is_not_converged(error) => f64::INFINITY,
+                Err(_) => f64::NAN,
+            };
+            if after.is_nan() {
+                outcome?;
+                return Err(ArgminError::msg("the residual of the fit is not a number"));
+            }
+            let ratio = (before - after) / promised.max(f64::MIN_POSITIVE);
+            if last || ratio > SUFFICIENT {
+                if ratio > 0.75 && d.amax() > 0.9 * self.trust {
+                    self.trust *= 3.0;
+                } else if ratio < 0.25 {
+                    self.trust = (0.5 * d.amax()).max(SMALLEST_TRUST);
+                }
+                let residuals = outcome?;
+                let jacobian = jacobian(problem, &trial)?;
+                let gradient = jacobian.tr_mul(&DVector::from_column_slice(&residuals)).as_slice().to_vec();
+                let report = kv!("step" => self.step; "trust" => self.trust; "rejected" => rejected;);
+                let state = state.param(trial).residuals(residuals).jacobian(jacobian).gradient(gradient).cost(after);
+                return Ok((state, Some(report)));
+            }
+            rejected += 1;
+            self.trust = 0.3 * d.amax();
+            if self.trust < SMALLEST_TRUST {
+                let state = state.param(q).residuals(r).jacobian(j).cost(before);
+                let reason = TerminationReason::SolverExit("no step lowers the objective".into());
+                return Ok((state.terminate_with(reason), None));
+            }
+        }
+    }
+
+    fn terminate(&mut self, _state: &GaussNewtonState) -> TerminationStatus {
+        if self.step <= self.tolerance {
+            TerminationStatus::Terminated(TerminationReason::SolverConverged)
+        } else {
+            TerminationStatus::NotTerminated
+        }
+    }
+}
+
+fn residuals<O>(problem: &mut Problem<O>, q: &Vec<f64>) -> Result<Vec<f64>, ArgminError>
+where
+    O: Operator<Param = Vec<f64>, Output = Vec<f64>>,
+{
+    problem.problem("residual_evaluations", |p| p.apply(q))
+}
+
+fn jacobian<O>(problem: &mut Problem<O>, q: &Vec<f64>) -> Result<DMatrix<f64>, ArgminError>
+where
+    O: Jacobian<Param = Vec<f64>, Jacobian = DMatrix<f64>>,
+{
+    problem.problem("jacobian_evaluations", |p| p.jacobian(q))
+}
+
+fn is_not_converged(error: &ArgminError) -> bool {
+    matches!(error.downcast_ref::<Error>(), Some(Error::NotConverged { .. } | Error::Singular { .. }))
+}
+
+/// 1/2 |r|^2
+fn cost(residuals: &[f64]) -> f64 {
+    0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
+}

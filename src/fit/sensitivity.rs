@@ -1,0 +1,80 @@
+//! How an equilibrium moves with the controls: dx/dq, one direction in the unknowns per control.
+
+use crate::error::Result;
+use crate::forward::{Drive, Equilibrium, Settings, Solver};
+use crate::model::Model;
+
+/// A way to find sensitivities.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Sensitivity {
+    /// By the implicit function theorem: K dx/dq = - dr/dq. One right-hand side per control with the factor of Newton's
+    /// last iteration.
+    Tangent,
+    /// By differences of whole equilibria: a check, and a choice where a tangent is not trusted.
+    FiniteDifference {
+        /// Change of a control in relation to (its value + its onset).
+        step: f64,
+    },
+}
+
+/// How much tighter than a fit's own equilibria those of finite differences are solved.
+const TIGHTER: f64 = 1e-4;
+
+/// dx/dq at an equilibrium for the controls `unknowns`, in their order.
+///
+/// # Errors
+/// Where the tangent cannot be factorised, or a neighbouring equilibrium is not found.
+pub fn sensitivities(
+    how: Sensitivity,
+    solver: &mut Solver<'_>,
+    at: &Equilibrium,
+    unknowns: &[usize],
+) -> Result<Vec<Vec<f64>>> {
+    match how {
+        Sensitivity::Tangent => tangent(solver, at, unknowns),
+        Sensitivity::FiniteDifference { step } => {
+            let settings = solver.settings();
+            solver.set_settings(Settings { tolerance: TIGHTER * settings.tolerance, ..settings });
+            let found = unknowns.iter().map(|control| difference(solver, at, *control, step)).collect();
+            solver.set_settings(settings);
+            found
+        }
+    }
+}
+
+fn tangent(solver: &mut Solver<'_>, at: &Equilibrium, unknowns: &[usize]) -> Result<Vec<Vec<f64>>> {
+    let model = solver.model();
+    let n = model.numbering().unknowns();
+    let mut columns = Vec::with_capacity(n * unknowns.len());
+    for control in unknowns {
+        columns.extend(model.control_force(&at.state, *control).iter().map(|f| -f));
+    }
+    solver.solve_with_tangent(&at.state, &mut columns, unknowns.len())?;
+    Ok(columns.chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
+}
+
+/// (x(q + h) - x(q - h)) / 2h, or (4 x(q + h) - x(q + 2h) - 3 x(q)) / 2h where q - h is out of bounds, or its mirror image
+/// at the upper bound.
+fn difference(solver: &mut Solver<'_>, at: &Equilibrium, control: usize, step: f64) -> Result<Vec<f64>> {
+    let model: &Model = solver.model();
+    let bounds = &model.controls()[control];
+    let q = at.state.controls[control];
+    let h = step * (q - bounds.lower + bounds.onset);
+    let mut moved = |by: f64| -> Result<Vec<f64>> {
+        let mut controls = at.state.controls.clone();
+        controls[control] += by;
+        let to = Drive { controls, load: at.state.load };
+        let found = solver.equilibrium_near(&at.state, &at.state, &to)?;
+        Ok(model.unknowns(&found.state))
+    };
+    let combine = |terms: &[(f64, Vec<f64>)]| -> Vec<f64> {
+        (0..model.numbering().unknowns()).map(|k| terms.iter().map(|(w, x)| w * x[k]).sum()).collect()
+    };
+    let inverse = 1.0 / (2.0 * h);
+    if q - h >= bounds.lower && q + h <= bounds.upper {
+        return Ok(combine(&[(inverse, moved(h)?), (-inverse, moved(-h)?)]));
+    }
+    let side = if q - h < bounds.lower { 1.0 } else { -1.0 };
+    let scale = side * inverse;
+    Ok(combine(&[(4.0 * scale, moved(side * h)?), (-scale, moved(2.0 * side * h)?), (-3.0 * scale, moved(0.0)?)]))
+}
