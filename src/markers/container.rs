@@ -20,9 +20,8 @@ use std::path::Path;
 
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::damage::{Damage, Unguarded};
 use super::fields::{self, ChannelRecord, Fields, SchemaRecord};
-use crate::{Error, Result};
+use crate::error::{Damage, Error, Result, Unguarded};
 
 /// Longest decompressed chunk that is accepted (bytes): one flipped bit can ask for a petabyte.
 const CHUNK_LIMIT: usize = 256 << 20;
@@ -370,4 +369,16 @@ fn check_crc(part: &'static str, stored: u32, parts: &[&[u8]]) -> std::result::R
     let mut crc = flate2::Crc::new();
     parts.iter().for_each(|bytes| crc.update(bytes));
     if crc.sum() == stored { Ok(()) } else { Err(Damage::Checksum { part, stored, computed: crc.sum() }) }
+}
+
+impl From<mcap::McapError> for Damage {
+    fn from(error: mcap::McapError) -> Self {
+        match error {
+            mcap::McapError::BadChunkCrc { saved, calculated } => {
+                Damage::Checksum { part: "chunk", stored: saved, computed: calculated }
+            }
+            mcap::McapError::UnsupportedCompression(name) => Damage::Compression { name },
+            other => Damage::Decompression { reason: other.to_string() },
+        }
+    }
 }

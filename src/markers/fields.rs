@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::damage::Damage;
+use crate::error::Damage;
 
 pub(super) const HEADER: u8 = 0x01;
 pub(super) const FOOTER: u8 = 0x02;

@@ -2,7 +2,8 @@
 
 use super::fields::SchemaRecord;
 use super::json::Json;
-use super::ros2::{Ros2, SchemaFault};
+use super::ros2::Ros2;
+use crate::error::{Fault, Unreadable};
 
 /// Every format, asked in this order.
 const FORMATS: [&dyn Format; 2] = [&Ros2, &Json];
@@ -43,96 +44,12 @@ pub(super) enum Sample {
     Invalid,
 }
 
-/// Why no format reads a topic.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Unreadable {
-    /// No format has this pair of schema encoding and message encoding.
-    #[error("no marker format has this encoding")]
-    Encoding,
-    /// The channel has no schema.
-    #[error("it has no schema")]
-    NoSchema,
-    /// The schema describes something else.
-    #[error("its schema has not {expected}")]
-    Layout {
-        /// The fields looked for.
-        expected: &'static str,
-    },
-    /// The schema cannot be read.
-    #[error("{0}")]
-    Schema(#[from] SchemaFault),
-    /// The schema is not JSON.
-    #[error("its schema is not JSON (line {line}, column {column})")]
-    NotJson {
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-    },
-}
-
 /// A message that does not hold what its schema promises.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct DecodeFault {
     /// Place in the payload, bytes.
     pub byte: usize,
     pub fault: Fault,
-}
-
-/// What is wrong with a message.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Fault {
-    /// The message ends too early.
-    #[error("{needed} more bytes expected, {left} left")]
-    Short {
-        /// Bytes (or elements of at least a byte) that should follow.
-        needed: usize,
-        /// Bytes that follow.
-        left: usize,
-    },
-    /// The message is longer than its schema says.
-    #[error("{bytes} bytes are left over")]
-    Left {
-        /// Bytes behind the last field.
-        bytes: usize,
-    },
-    /// More elements than the schema allows.
-    #[error("{count} elements, the schema allows {bound}")]
-    Bound {
-        /// Elements in the message.
-        count: usize,
-        /// Largest number allowed.
-        bound: usize,
-    },
-    /// A truth value that is neither 0 nor 1.
-    #[error("a truth value is neither 0 nor 1")]
-    Bool,
-    /// A text without its closing zero, or not UTF-8.
-    #[error("a text is not closed or not UTF-8")]
-    Text,
-    /// An encoding other than plain CDR; has its own error.
-    #[error("encapsulation {:02x}{:02x}", id[0], id[1])]
-    Encapsulation {
-        /// The first two bytes.
-        id: [u8; 2],
-    },
-    /// A time stamp that is none.
-    #[error("the time stamp {sec} s + {nanosec} ns is out of range")]
-    Stamp {
-        /// Seconds.
-        sec: i64,
-        /// Nanoseconds, below 1e9 in a good stamp.
-        nanosec: i64,
-    },
-    /// A field is not of the expected kind.
-    #[error("the fields are not those of the schema")]
-    Shape,
-    /// The message is not the JSON that its schema promises.
-    #[error("{message}")]
-    Json {
-        /// What the JSON reader said.
-        message: String,
-    },
 }
 
 /// Nanoseconds of a stamp in two parts.

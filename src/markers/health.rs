@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::damage::Unguarded;
-use super::recording::Units;
+use crate::error::{Missing, Unguarded};
+use crate::scene::Units;
 
 /// An interval longer than this many median intervals is a gap.
 const GAP: f64 = 1.5;
@@ -82,47 +82,6 @@ pub struct LabelHealth {
 impl LabelHealth {
     pub(super) fn new(label: &str) -> LabelHealth {
         LabelHealth { label: label.into(), present: 0, missing: Missing::default() }
-    }
-}
-
-/// Missing samples by kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Missing {
-    /// Not in the message, or without a position there.
-    pub absent: usize,
-    /// NaN or infinite.
-    pub not_finite: usize,
-    /// Exactly (0, 0, 0).
-    pub zero: usize,
-    /// Marked as not valid by the message.
-    pub invalid: usize,
-    /// The label stands more than once in the message.
-    pub ambiguous: usize,
-}
-
-impl Missing {
-    /// Of all kinds together.
-    pub fn total(&self) -> usize {
-        self.absent + self.not_finite + self.zero + self.invalid + self.ambiguous
-    }
-
-    /// Sum of two counts.
-    pub(super) fn plus(self, other: Missing) -> Missing {
-        Missing {
-            absent: self.absent + other.absent,
-            not_finite: self.not_finite + other.not_finite,
-            zero: self.zero + other.zero,
-            invalid: self.invalid + other.invalid,
-            ambiguous: self.ambiguous + other.ambiguous,
-        }
-    }
-}
-
-impl fmt::Display for Missing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Missing { absent, not_finite, zero, invalid, ambiguous } = self;
-        write!(f, "absent {absent}, not finite {not_finite}, (0, 0, 0) {zero}, ")?;
-        write!(f, "marked invalid {invalid}, label twice {ambiguous}")
     }
 }
 

@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::container::Container;
-use super::damage::Unguarded;
 use super::format;
-use super::health::{Clock, Health, LabelHealth, Missing, Warning};
+use super::health::{Clock, Health, LabelHealth, Warning};
 use super::read::{ReadOptions, decode, load};
-use super::recording::{Recording, Units};
-use super::topic::{Topic, readers};
-use crate::Result;
+use super::recording::Recording;
+use super::topic::readers;
+use crate::error::{Missing, Result, Topic, Unguarded};
+use crate::scene::Units;
 
 /// The size, in millimetres, that the markers on a face or a phantom have: the diagonal of their box.
 const PLAUSIBLE_MM: [f64; 2] = [20.0, 600.0];

@@ -11,7 +11,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::fields::SchemaRecord;
-use super::format::{DecodeFault, Decoder, Fault, Format, Observation, Sample, Unreadable, stamp_ns};
+use super::format::{DecodeFault, Decoder, Format, Observation, Sample, stamp_ns};
+use crate::error::{Fault, Unreadable};
 
 /// Messages that are JSON objects with an array `markers`.
 pub(super) struct Json;

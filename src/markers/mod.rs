@@ -10,7 +10,6 @@
 //! [`read`] gives the recording of one topic, [`inspect`] says what is in a file, [`write_json`] writes our own format.
 
 mod container;
-mod damage;
 mod fields;
 mod format;
 mod health;
@@ -22,13 +21,10 @@ mod ros2;
 mod topic;
 mod write;
 
-pub use damage::{Damage, Unguarded};
-pub use format::{Fault, Unreadable};
-pub use health::{Clock, Gap, Health, LabelHealth, Missing, Warning};
+pub use crate::error::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
+pub use crate::scene::Units;
+pub use health::{Clock, Gap, Health, LabelHealth, Warning};
 pub use inspect::{Contents, Extent, Inspection, MarkerTopic, inspect, inspect_bytes};
 pub use read::{ReadOptions, read, read_bytes};
-pub use recording::{Frame, Recording, Source, Units};
-pub use ros2::SchemaFault;
-pub use topic::Topic;
-pub(crate) use topic::list as list_topics;
+pub use recording::{Frame, Recording, Source};
 pub use write::{Compression, WriteOptions, write_json};

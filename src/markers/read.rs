@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::container::{Container, Message};
-use super::format::{self, Fault};
-use super::health::{Clock, Health, Missing, Timing, Warning, seconds};
-use super::recording::{Collector, Frame, Recording, Source, Units};
-use super::topic::{Reader, Topic, readers};
-use crate::{Error, Result};
+use super::format;
+use super::health::{Clock, Health, Timing, Warning, seconds};
+use super::recording::{Collector, Frame, Recording, Source};
+use super::topic::{Reader, readers};
+use crate::error::{Error, Fault, Missing, Result, Topic};
+use crate::scene::Units;
 
 /// How to read a recording.
 #[derive(Debug, Clone, PartialEq)]

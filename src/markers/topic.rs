@@ -1,57 +1,10 @@
 //! The topics of a file, and which of them carries markers.
 
 use std::collections::BTreeMap;
-use std::fmt;
-
-use serde::Serialize;
 
 use super::container::{Container, Traffic};
-use super::format::{self, Decoder, Unreadable};
-
-/// One topic of a file.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Topic {
-    /// Its name.
-    pub name: String,
-    /// Name of its schema; empty if it has none.
-    pub schema: String,
-    /// Encoding of the schema, for example `ros2msg`.
-    pub schema_encoding: String,
-    /// Encoding of its messages, for example `cdr`.
-    pub message_encoding: String,
-    /// Number of messages.
-    pub messages: u64,
-    /// Log time of the first and the last message, nanoseconds.
-    pub log_time_ns: Option<[u64; 2]>,
-    /// The marker format that reads it, or why none does.
-    pub markers: std::result::Result<String, String>,
-}
-
-impl Topic {
-    /// Whether its markers can be read.
-    pub fn is_readable(&self) -> bool {
-        self.markers.is_ok()
-    }
-}
-
-impl fmt::Display for Topic {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Topic { name, schema, schema_encoding, message_encoding, messages, .. } = self;
-        write!(f, "`{name}`: {schema} ({message_encoding}, {schema_encoding}), {messages} messages, ")?;
-        match &self.markers {
-            Ok(format) => write!(f, "readable as {format}"),
-            Err(reason) => write!(f, "not readable: {reason}"),
-        }
-    }
-}
-
-/// Topics one per line, for messages.
-pub(crate) fn list(topics: &[Topic]) -> String {
-    match topics {
-        [] => "no topics at all".into(),
-        topics => topics.iter().map(|topic| format!("\n  {topic}")).collect(),
-    }
-}
+use super::format::{self, Decoder};
+use crate::error::{Topic, Unreadable};
 
 /// A topic with what reads its messages.
 pub(super) struct Reader {

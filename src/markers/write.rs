@@ -7,7 +7,8 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use serde::Serialize;
 
-use super::recording::{Recording, Units};
+use super::recording::Recording;
+use crate::scene::Units;
 use crate::{Error, Result};
 
 /// Name of the schema.

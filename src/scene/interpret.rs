@@ -5,6 +5,7 @@ use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader
 use super::references::References;
 use super::spec::*;
 use super::tree::Node;
+use super::units::Units;
 
 /// The scene of a whole file; `None` if there is any mistake in a value.
 pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: &Mistakes) -> Option<Scene> {
@@ -249,7 +250,7 @@ fn marker(table: &mut Table) -> Option<MarkerSpec> {
 
 fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
-    let units = [("mm", Units::Mm), ("cm", Units::Cm), ("m", Units::M)];
+    let units = Units::ALL.map(|units| (units.name(), units));
     let units = table.required("units", "units = \"m\"", |item| item.choice(&units, &[]));
     let topic = table.optional("topic", |item| item.name());
     let sensitivities =

@@ -195,11 +195,6 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         finite_difference_step,
         place: _,
     } = fit;
-    let units = match units {
-        Units::Mm => "mm",
-        Units::Cm => "cm",
-        Units::M => "m",
-    };
     let sensitivity = match sensitivity {
         SensitivitySpec::Tangent => "tangent",
         SensitivitySpec::FiniteDifference => "finite-difference",

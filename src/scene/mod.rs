@@ -16,9 +16,11 @@ mod overrides;
 mod references;
 mod spec;
 mod tree;
+mod units;
 
 pub use curves::Curves;
 pub use spec::*;
+pub use units::Units;
 
 use crate::error::{Error, Result, Warning};
 use cursor::Mistakes;

@@ -3,6 +3,7 @@
 //! Every number here is finite and within its range, every name that refers to a muscle refers to one, every path is
 //! absolute. What needs geometry (is the muscle inside its host?) is asked later, and points back through `place`.
 
+use super::units::Units;
 use crate::error::Place;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -304,29 +305,6 @@ pub struct FitSpec {
     /// The table in the file.
     #[serde(skip)]
     pub place: Place,
-}
-
-/// A unit of length: `[fit] units`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Units {
-    /// Millimetres.
-    Mm,
-    /// Centimetres.
-    Cm,
-    /// Metres.
-    M,
-}
-
-impl Units {
-    /// The unit in millimetres.
-    pub fn in_mm(self) -> f64 {
-        match self {
-            Units::Mm => 1.0,
-            Units::Cm => 10.0,
-            Units::M => 1000.0,
-        }
-    }
 }
 
 /// How the derivative of the shape by the activations is found: `[fit] sensitivity`.

@@ -5,7 +5,8 @@
 //! a sequence is a 32-bit length, then the elements. Source: OMG DDS-XTypes 1.3, section 7.4.1.
 
 use super::schema::{Count, Field, Kind, Types};
-use crate::markers::format::{DecodeFault, Fault};
+use crate::error::Fault;
+use crate::markers::format::DecodeFault;
 
 /// Bytes in front of the message that say how it is encoded.
 const ENCAPSULATION: usize = 4;

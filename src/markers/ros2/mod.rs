@@ -8,12 +8,11 @@
 mod cdr;
 mod schema;
 
-pub use schema::SchemaFault;
-
 use self::cdr::Value;
 use self::schema::{Count, Field, Kind, Types};
 use super::fields::SchemaRecord;
-use super::format::{DecodeFault, Decoder, Fault, Format, Observation, Sample, Unreadable, stamp_ns};
+use super::format::{DecodeFault, Decoder, Format, Observation, Sample, stamp_ns};
+use crate::error::{Fault, Unreadable};
 
 /// `mocap4r2_msgs/msg/Markers`.
 pub(super) struct Ros2;

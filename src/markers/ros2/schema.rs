@@ -5,6 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::error::SchemaFault;
+
 /// Deepest nesting of messages that is accepted.
 const DEPTH_LIMIT: usize = 32;
 
@@ -46,42 +48,6 @@ pub(super) enum Count {
     Fixed(usize),
     /// A sequence with its own length, at most so many.
     Sequence(Option<usize>),
-}
-
-/// Why a schema text cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SchemaFault {
-    /// The text is not UTF-8.
-    #[error("the schema is not text")]
-    NotText,
-    /// A line is not a field, a constant, a comment or a separator.
-    #[error("schema line {line} is not a field: `{text}`")]
-    Line {
-        /// Line, from 1.
-        line: usize,
-        /// The line.
-        text: String,
-    },
-    /// A type is used and not defined.
-    #[error("the schema uses `{name}` and does not define it")]
-    Undefined {
-        /// Name of the type.
-        name: String,
-    },
-    /// A type is defined twice.
-    #[error("the schema defines `{name}` twice")]
-    Twice {
-        /// Name of the type.
-        name: String,
-    },
-    /// Types contain each other, or are nested too deeply.
-    #[error("`{name}` contains itself or is nested more than {limit} deep")]
-    Nesting {
-        /// Name of the type.
-        name: String,
-        /// Deepest nesting accepted.
-        limit: usize,
-    },
 }
 
 /// A field before the names of types are resolved.
