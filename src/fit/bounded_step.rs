@@ -5,10 +5,7 @@
 use crate::error::{Error, Result};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
-use nalgebra::DMatrix;
-
-/// An entry this close to a bound, in parts of the width of the box, lies on it: an interior-point method only comes near.
-const ON_BOUND: f64 = 1e-7;
+use nalgebra::{DMatrix, DVector};
 
 /// The minimiser of the quadratic program. `h` is symmetric and positive semidefinite; the box must not be empty.
 ///
@@ -55,17 +52,34 @@ pub fn bounded_step(h: &DMatrix<f64>, g: &[f64], lower: &[f64], upper: &[f64]) -
     if status != SolverStatus::Solved {
         return Err(Error::StepNotSolved { status: name(status) });
     }
-    let on_bound = |d: f64, l: f64, u: f64| {
-        let close = ON_BOUND * (u - l);
-        if d - l <= close {
-            l
-        } else if u - d <= close {
-            u
-        } else {
-            d
-        }
-    };
-    Ok(solver.solution.x.iter().zip(lower).zip(upper).map(|((d, l), u)| on_bound(*d, *l, *u)).collect())
+    let (x, z, slack) = (&solver.solution.x, &solver.solution.z, &solver.solution.s);
+    // rows of the constraints: first upper bounds, then lower; an active one has a multiplier larger than its slack
+    let active = |row: usize| z[row] > slack[row];
+    let fixed: Vec<Option<f64>> = (0..n)
+        .map(|i| if active(i) { Some(upper[i]) } else { active(n + i).then_some(lower[i]) })
+        .collect();
+    let inside = |d: &[f64]| d.iter().zip(lower).zip(upper).all(|((d, l), u)| (l..=u).contains(&d));
+    match on_active_set(h, g, &fixed) {
+        Some(exact) if inside(&exact) => Ok(exact),
+        // a degenerate active set: what Clarabel found, which is inside to its tolerance
+        _ => Ok(x.iter().zip(lower).zip(upper).map(|((d, l), u)| d.clamp(*l, *u)).collect()),
+    }
+}
+
+/// The minimiser with some entries fixed: an interior-point method only comes near a bound, and this ends on it.
+fn on_active_set(h: &DMatrix<f64>, g: &[f64], fixed: &[Option<f64>]) -> Option<Vec<f64>> {
+    let n = g.len();
+    let free: Vec<usize> = (0..n).filter(|i| fixed[*i].is_none()).collect();
+    let mut d: Vec<f64> = fixed.iter().map(|f| f.unwrap_or(0.0)).collect();
+    let right = DVector::from_iterator(
+        free.len(),
+        free.iter().map(|i| -g[*i] - (0..n).map(|k| h[(*i, k)] * d[k]).sum::<f64>()),
+    );
+    let solution = h.select_rows(&free).select_columns(&free).cholesky()?.solve(&right);
+    for (i, value) in free.iter().zip(solution.iter()) {
+        d[*i] = *value;
+    }
+    d.iter().all(|d| d.is_finite()).then_some(d)
 }
 
 /// Every status of Clarabel by name.

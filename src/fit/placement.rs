@@ -92,23 +92,15 @@ pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: 
         return Ok(());
     }
     // the unit u for which ratio / in_mm(declared) x in_mm(u) is nearest to one
-    let off = |units: Units| (ratio / fit.units.in_mm() * units.in_mm()).log10().abs();
+    let off = |units: Units| (ratio / fit.units.mm() * units.mm()).log10().abs();
     let likely = [Units::Mm, Units::Cm, Units::M].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
     Err(Error::UnitsLookWrong {
         ratio,
         labels: pairs.len(),
-        declared: word(fit.units),
-        likely: word(likely.unwrap_or(fit.units)),
+        declared: fit.units.name(),
+        likely: likely.unwrap_or(fit.units).name(),
         place: Box::new(fit.place.clone()),
     })
-}
-
-fn word(units: Units) -> &'static str {
-    match units {
-        Units::Mm => "mm",
-        Units::Cm => "cm",
-        Units::M => "m",
-    }
 }
 
 fn spread(points: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {

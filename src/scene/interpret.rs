@@ -261,9 +261,9 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
-    let tolerance = table.or("tolerance", 1e-8, |item| item.number(PART));
+    let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
-    let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
+    let finite_difference_step = table.or("finite_difference_step", 1e-3, |item| item.number(PART));
     Some(FitSpec {
         markers: markers?,
         units: units?,

@@ -296,11 +296,12 @@ pub struct FitSpec {
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.
     pub frames: FramesSpec,
-    /// The change of the activations at which the search ends.
+    /// The change of the activations at which the search ends; the step that shows it is still taken.
     pub tolerance: f64,
     /// The most Gauss-Newton steps per frame.
     pub max_iterations: usize,
-    /// The step of finite differences in activation.
+    /// The step of finite differences in relation to (activation + onset), the onset being the shear modulus of the
+    /// tissue over sigma_max.
     pub finite_difference_step: f64,
     /// The table in the file.
     #[serde(skip)]
