@@ -410,6 +410,14 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// The folder asked for holds something already.
+    #[error("the output folder {} is not empty: it holds {entries} files or folders", path.display())]
+    FolderNotEmpty {
+        /// The folder.
+        path: PathBuf,
+        /// What is in it.
+        entries: usize,
+    },
 }
 
 impl Error {
@@ -464,6 +472,7 @@ impl Error {
             Error::FactorTooLarge { .. } => "S011",
             Error::NotFactored => "S012",
             Error::Io { .. } => "O001",
+            Error::FolderNotEmpty { .. } => "O002",
         }
     }
 
@@ -535,6 +544,9 @@ impl Error {
             Error::FactorTooLarge { .. } => Some("use a coarser mesh or a machine with more memory".into()),
             Error::NotFactored => None,
             Error::Io { .. } => Some("check that the path exists and that you may use it".into()),
+            Error::FolderNotEmpty { .. } => {
+                Some("choose another --out, or add --force to replace the run that is in it".into())
+            }
         }
     }
 
