@@ -11,6 +11,7 @@ pub mod material;
 pub mod math;
 pub mod mesh;
 pub mod model;
+pub mod report;
 pub mod scene;
 pub mod solve;
 pub mod term;

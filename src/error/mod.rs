@@ -552,6 +552,14 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// The folder asked for holds something already.
+    #[error("the output folder {} is not empty: it holds {entries} files or folders", path.display())]
+    FolderNotEmpty {
+        /// The folder.
+        path: PathBuf,
+        /// What is in it.
+        entries: usize,
+    },
 }
 
 impl Error {
@@ -619,6 +627,7 @@ impl Error {
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
             Error::Io { .. } => "O001",
+            Error::FolderNotEmpty { .. } => "O002",
         }
     }
 
@@ -716,6 +725,9 @@ impl Error {
             Error::FactorTooLarge { .. } => Some("use a coarser mesh or a machine with more memory".into()),
             Error::NotFactored => None,
             Error::Io { .. } => Some("check that the path exists and that you may use it".into()),
+            Error::FolderNotEmpty { .. } => {
+                Some("choose another --out, or add --force to replace the run that is in it".into())
+            }
         }
     }
 

@@ -15,6 +15,7 @@ use crate::math::factor::Symbolic;
 use crate::math::ordering::Ordering;
 use crate::math::sparse::{BlockPattern, SymmetricMatrix};
 use crate::mesh::Mesh;
+use crate::term::muscle::Muscle;
 use crate::term::pressure::PressureSpace;
 use crate::term::{ElementState, Term, Want};
 use assembly::{Parts, Plan};
@@ -88,6 +89,11 @@ impl Model {
     /// All effects, the tissue first.
     pub fn terms(&self) -> &[Box<dyn Term>] {
         &self.ingredients.terms
+    }
+
+    /// The muscles among the terms, each with its index in [`Model::terms`].
+    pub fn muscles(&self) -> impl Iterator<Item = (usize, &Muscle)> {
+        self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_muscle()?)))
     }
 
     /// Inputs in their order in [`State::controls`].

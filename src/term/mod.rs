@@ -135,4 +135,9 @@ pub trait Term: Send + Sync {
 
     /// Quadrature points of the term in an element: a count of work.
     fn points(&self, element: usize) -> usize;
+
+    /// The term as a muscle, if it is one: its fibres are shown in results.
+    fn as_muscle(&self) -> Option<&muscle::Muscle> {
+        None
+    }
 }

@@ -194,6 +194,10 @@ impl Term for Muscle {
         &self.control
     }
 
+    fn as_muscle(&self) -> Option<&Muscle> {
+        Some(self)
+    }
+
     fn add(&self, state: &ElementState<'_>, want: Want, system: &mut ElementSystem) -> Contribution {
         let mut energy = 0.0;
         for point in self.points_in(state.element) {

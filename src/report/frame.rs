@@ -1,0 +1,112 @@
+//! What the rows and files of a frame are made from: its number and time, points that are followed, markers with their
+//! measurement, muscles with their stretch.
+
+use crate::math::tensor::{Vector, norm, subtract};
+use crate::mesh::MaterialPoint;
+use crate::model::{Evaluation, Model, State};
+
+/// A frame of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Its number, from 0; of a fit, its number in the recording.
+    pub index: usize,
+    /// Its time, s.
+    pub time_s: f64,
+}
+
+/// A material point that is followed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Its name.
+    pub name: String,
+    /// Where it lies in the host.
+    pub at: MaterialPoint,
+}
+
+/// A probe at a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProbeState<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Current position, mm.
+    pub position: Vector,
+    /// Displacement, mm.
+    pub displacement: Vector,
+}
+
+/// A marker of the model beside its measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkerPair<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Where the model has it, mm.
+    pub model: Vector,
+    /// Where it was measured, mm, in the coordinates of the model; `None` where it was lost.
+    pub measured: Option<Vector>,
+}
+
+impl MarkerPair<'_> {
+    /// Measured minus model, mm.
+    pub fn residual(&self) -> Option<Vector> {
+        self.measured.map(|measured| subtract(measured, self.model))
+    }
+
+    /// Length of the residual, mm.
+    pub fn distance(&self) -> Option<f64> {
+        self.residual().map(norm)
+    }
+}
+
+/// A muscle at a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MuscleState<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its activation.
+    pub activation: f64,
+    /// Mean fibre stretch lambda = |F n0|, weighted by reference volume.
+    pub mean_stretch: f64,
+    /// Smallest stretch at a quadrature point.
+    pub min_stretch: f64,
+    /// Largest stretch at a quadrature point.
+    pub max_stretch: f64,
+    /// Energy, uJ.
+    pub energy: f64,
+}
+
+/// Probes at a state, in their order.
+pub fn probe_states<'a>(probes: &'a [Probe], model: &Model, state: &State) -> Vec<ProbeState<'a>> {
+    let x = model.current(state);
+    let at = |probe: &'a Probe| ProbeState {
+        name: &probe.name,
+        position: model.mesh().interpolate(probe.at, &x),
+        displacement: model.mesh().interpolate(probe.at, &state.u),
+    };
+    probes.iter().map(at).collect()
+}
+
+/// All muscles of a model at a state, in the order of its terms.
+pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluation) -> Vec<MuscleState<'m>> {
+    let x = model.current(state);
+    let muscle_state = |(term, muscle): (usize, &'m crate::term::muscle::Muscle)| {
+        let (mut sum, mut min, mut max) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
+        for in_element in muscle.points().chunk_by(|a, b| a.host.element == b.host.element) {
+            let local = model.mesh().local_of(in_element[0].host.element, &x);
+            for point in in_element {
+                let stretch = norm(point.deformed_fibre(&local));
+                sum += point.weight * stretch;
+                min = stretch.min(min);
+                max = stretch.max(max);
+            }
+        }
+        MuscleState {
+            name: model.terms()[term].name(),
+            activation: state.controls[muscle.control()],
+            mean_stretch: sum / muscle.volume(),
+            min_stretch: min,
+            max_stretch: max,
+            energy: evaluation.energies[term],
+        }
+    };
+    model.muscles().map(muscle_state).collect()
+}

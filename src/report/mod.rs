@@ -1,0 +1,29 @@
+//! What a run leaves behind, so that nothing has to be asked of the program again.
+//!
+//! ```text
+//! runs/<name>-0001/
+//!   status.json, manifest.json          how it stands, what was run on what
+//!   summary.txt                         the page that the terminal showed
+//!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
+//!   view/result.pvd, muscles.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
+//! ```
+//!
+//! Whole files are written atomically, tables grow frame by frame: a crash or a full disk leaves every finished frame
+//! readable.
+
+pub mod frame;
+pub mod machine;
+pub mod manifest;
+pub mod pvd;
+pub mod run_folder;
+pub mod status;
+pub mod summary;
+pub mod tables;
+pub mod view;
+pub mod vtu;
+
+pub use frame::{Frame, MarkerPair, MuscleState, Probe, ProbeState, muscle_states, probe_states};
+pub use manifest::{Input, Manifest};
+pub use run_folder::RunFolder;
+pub use status::{FailedFrame, Outcome, Status};
+pub use view::View;

@@ -1,0 +1,33 @@
+//! `cost.csv`: what each effect cost, then the solver and the output.
+
+use super::{Cell, Rows};
+use crate::error::Result;
+use crate::forward::Work;
+use crate::model::Model;
+use crate::report::run_folder::RunFolder;
+
+/// Writes the table `part,seconds,clock,points,count,flops`: a row per effect that the scene named (seconds summed over
+/// `threads`, quadrature points evaluated), then rows on the `wall` clock for `assembly` (evaluations, which hold the
+/// effects, and assemblies), `factorisation`, `solve` and `output`.
+///
+/// # Errors
+/// [`Error::Io`](crate::Error::Io).
+pub fn write_cost(run: &RunFolder, model: &Model, work: &Work, output_seconds: f64) -> Result<()> {
+    let mut rows = Rows::default();
+    rows.add("part,seconds,clock,points,count,flops".split(',').map(Cell::Text));
+    for ((term, seconds), points) in model.terms().iter().zip(&work.term_seconds).zip(&work.points) {
+        let cost = [(*seconds).into(), "threads".into(), (*points).into(), Cell::Empty, Cell::Empty];
+        rows.add([term.name().into()].into_iter().chain(cost));
+    }
+    let mut wall = |part, seconds: f64, count, flops| {
+        rows.add([Cell::Text(part), seconds.into(), "wall".into(), Cell::Empty, count, flops]);
+    };
+    let linear = &work.linear;
+    let evaluations = work.force_evaluations + work.assemblies;
+    wall("assembly", work.assembly_seconds, evaluations.into(), Cell::Empty);
+    let (count, flops) = (linear.factorisations.into(), linear.factor_flops.into());
+    wall("factorisation", linear.factor_time.as_secs_f64(), count, flops);
+    wall("solve", linear.solve_time.as_secs_f64(), linear.solves.into(), Cell::Empty);
+    wall("output", output_seconds, Cell::Empty, Cell::Empty);
+    run.write("tables/cost.csv", rows.text)
+}

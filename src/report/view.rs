@@ -1,0 +1,79 @@
+//! The folder `view`: the shapes of every frame, and the lists that play them.
+
+use super::frame::{Frame, MarkerPair};
+use super::pvd::Collection;
+use super::run_folder::RunFolder;
+use super::vtu::{Grid, bezier, linear, markers, muscles};
+use crate::error::Result;
+use crate::model::{Model, State};
+use std::path::PathBuf;
+
+/// Writes shapes frame by frame.
+#[derive(Debug, Clone)]
+pub struct View {
+    folder: PathBuf,
+    shape: Series,
+    linear: Series,
+    muscles: Series,
+    markers: Series,
+}
+
+/// Files `<folder>/<name>_0000.vtu` and their list `<folder>/<name>.pvd`.
+#[derive(Debug, Clone)]
+struct Series {
+    folder: PathBuf,
+    name: &'static str,
+    collection: Collection,
+}
+
+impl View {
+    /// In the folder of a run. Nothing is written before the first frame.
+    pub fn new(run: &RunFolder) -> View {
+        let folder = run.view();
+        View {
+            shape: Series::new(folder.clone(), "result"),
+            linear: Series::new(folder.join("linear"), "result"),
+            muscles: Series::new(folder.clone(), "muscles"),
+            markers: Series::new(folder.clone(), "markers"),
+            folder,
+        }
+    }
+
+    /// Adds a frame: the exact shape, the resampled one, the muscles if the model has any, the markers if there are any.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io).
+    pub fn add(&mut self, frame: Frame, model: &Model, state: &State, markers: &[MarkerPair<'_>]) -> Result<()> {
+        self.shape.add(frame, &bezier::shape(model, state, frame.time_s))?;
+        self.linear.add(frame, &linear::shape(model, state, frame.time_s))?;
+        if model.muscles().next().is_some() {
+            self.muscles.add(frame, &muscles::points(model, state, frame.time_s))?;
+        }
+        if !markers.is_empty() {
+            self.markers.add(frame, &markers::points(markers, frame.time_s))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the iterate at which a frame failed as `failed.vtu`; returns its path.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io).
+    pub fn write_failed(&self, frame: Frame, model: &Model, state: &State) -> Result<PathBuf> {
+        let path = self.folder.join("failed.vtu");
+        bezier::shape(model, state, frame.time_s).write(&path)?;
+        Ok(path)
+    }
+}
+
+impl Series {
+    fn new(folder: PathBuf, name: &'static str) -> Series {
+        Series { collection: Collection::new(folder.join(format!("{name}.pvd"))), folder, name }
+    }
+
+    fn add(&mut self, frame: Frame, grid: &Grid) -> Result<()> {
+        let file = format!("{}_{:04}.vtu", self.name, frame.index);
+        grid.write(&self.folder.join(&file))?;
+        self.collection.add(frame.time_s, &file)
+    }
+}
