@@ -5,7 +5,7 @@
 //! to `data/beam_truth.csv`.
 
 use risorius::forward::{Drive, Solver};
-use risorius::markers::{Compression, Frame, Recording, WriteOptions, write_json};
+use risorius::markers::{Compression, Frame, WriteOptions, write_json};
 use risorius::mesh::MaterialPoint;
 use risorius::mesh::surface::Surface;
 use risorius::scene::{Scene, Units};
@@ -55,17 +55,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         frames.push(Frame { time_s, stamp_ns: START_NS + (time_s * 1e9).round() as i64, positions_mm });
         println!("frame {k}");
     }
-    let labels = scene.markers.iter().map(|m| m.name.clone()).collect();
-    let recording = Recording::new(labels, frames);
+    let labels: Vec<String> = scene.markers.iter().map(|m| m.name.clone()).collect();
     let options = WriteOptions { topic: "/markers".into(), compression: Compression::Zstd, units: Units::M };
-    write_json(&root.join("data/beam.mcap"), &recording, &options)?;
+    write_json(&root.join("data/beam.mcap"), &labels, &frames, &options)?;
     std::fs::write(root.join("data/beam_truth.csv"), truth)?;
     Ok(())
 }
 
 /// Activations (top, bottom) at t in [0, 1]: two overlapping bumps, 5 % and 8 % at their peaks.
 fn activations(t: f64) -> [f64; 2] {
-    let bump = |from: f64, to: f64| if (from..=to).contains(&t) { (PI * (t - from) / (to - from)).sin().powi(2) } else { 0.0 };
+    let bump = |from: f64, to: f64| {
+        if (from..=to).contains(&t) { (PI * (t - from) / (to - from)).sin().powi(2) } else { 0.0 }
+    };
     [0.05 * bump(0.0, 0.7), 0.08 * bump(0.3, 1.0)]
 }
 

@@ -1,1 +1,7 @@
-fn main() {}
+//! The command line: see `risorius --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    risorius::cli::main()
+}

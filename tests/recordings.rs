@@ -109,7 +109,7 @@ fn what_is_written_comes_back() {
     for (name, compression) in [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)] {
         let path = folder.path().join(name);
         let options = WriteOptions { topic: "/face".into(), compression, units: Units::Mm };
-        write_json(&path, &original, &options).unwrap();
+        write_json(&path, &original.labels, &original.frames, &options).unwrap();
         let again = read(&path, &ReadOptions::default()).unwrap();
         assert_eq!((&again.labels, &again.frames), (&original.labels, &original.frames));
         assert_eq!(again.source.topic, "/face");
@@ -118,12 +118,18 @@ fn what_is_written_comes_back() {
         assert_eq!(again.health.warnings, []);
         assert_eq!(again.health.labels[2].missing, Missing { absent: 1, ..Missing::default() });
         let first = std::fs::read(&path).unwrap();
-        write_json(&path, &original, &options).unwrap();
+        write_json(&path, &original.labels, &original.frames, &options).unwrap();
         assert_eq!(first, std::fs::read(&path).unwrap(), "the same recording gives the same bytes");
     }
 
     let path = folder.path().join("metres");
-    write_json(&path, &original, &WriteOptions { units: Units::M, ..WriteOptions::default() }).unwrap();
+    write_json(
+        &path,
+        &original.labels,
+        &original.frames,
+        &WriteOptions { units: Units::M, ..WriteOptions::default() },
+    )
+    .unwrap();
     let metres = read(&path, &ReadOptions { units: Units::M, ..ReadOptions::default() }).unwrap();
     for (frame, expected) in metres.frames.iter().zip(&original.frames) {
         for (position, expected) in frame.positions_mm.iter().flatten().zip(expected.positions_mm.iter().flatten()) {
@@ -139,11 +145,14 @@ fn what_is_written_comes_back() {
     }
 
     original.frames[5].positions_mm.pop();
-    let error = write_json(&path, &original, &WriteOptions::default()).unwrap_err();
+    let error = write_json(&path, &original.labels, &original.frames, &WriteOptions::default()).unwrap_err();
     assert!(matches!(error, Error::FrameShape { frame: 5, positions: 3, labels: 4 }), "{error}");
     original.frames[5].positions_mm.push(None);
     let nowhere = folder.path().join("no/such/folder.mcap");
-    assert_eq!(write_json(&nowhere, &original, &WriteOptions::default()).unwrap_err().code(), "O001");
+    assert_eq!(
+        write_json(&nowhere, &original.labels, &original.frames, &WriteOptions::default()).unwrap_err().code(),
+        "O001"
+    );
 }
 
 #[test]

@@ -1,3 +1,175 @@
-//! What a user types and sees. Prints, never computes.
+//! The command line: one file per command. It asks, calls and prints; it never computes.
+//!
+//! Standard output carries results, standard error progress and messages. Exit codes: 0 ok, 2 usage, 3 invalid input,
+//! 4 not converged (what converged is written), 5 warnings under `--strict`, 6 input or output failed, 130 interrupted.
 
+mod check;
 pub mod diagnostics;
+mod fit;
+mod forward;
+mod inspect;
+mod problem;
+mod progress;
+mod run;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use diagnostics::{Colour, render_error, render_warning};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use crate::error::{Error, Result, Warning};
+
+/// Finds out which muscles moved a face.
+///
+/// Without a command it runs the problem that is built in: a beam with two muscles and a recording of its markers.
+#[derive(Debug, Parser)]
+#[command(name = "risorius", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    flags: Flags,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Do what a problem file says; without one, the problem that is built in
+    Run {
+        /// problem.toml
+        problem: Option<PathBuf>,
+    },
+    /// Everything but the solve: all mistakes at once, which effects are on, what it will cost
+    Check {
+        /// problem.toml
+        problem: Option<PathBuf>,
+    },
+    /// What is in a marker recording
+    Inspect {
+        /// An MCAP file
+        file: PathBuf,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// Flags of every command.
+#[derive(Debug, Args)]
+struct Flags {
+    /// Threads [default: all]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Folder for the results [default: runs/<name>-<number>]
+    #[arg(long, global = true, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write into a folder that is not empty
+    #[arg(long, global = true)]
+    force: bool,
+    /// Set a key of the problem, for example --set solver.step_max=0.02
+    #[arg(long, global = true, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Stop before the first solve
+    #[arg(long, global = true)]
+    dry_run: bool,
+    /// A warning ends the command with exit code 5
+    #[arg(long, global = true)]
+    strict: bool,
+    /// Only errors and results
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Colours of messages
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
+    color: When,
+    /// Progress of long work
+    #[arg(long, global = true, value_enum, default_value_t = Progress::Auto)]
+    progress: Progress,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum When {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Progress {
+    /// A bar on a terminal, else a line per frame
+    Auto,
+    /// A line per frame
+    Plain,
+    /// Nothing
+    None,
+}
+
+impl Flags {
+    fn colour(&self) -> bool {
+        let when = match self.color {
+            When::Auto => Colour::Auto,
+            When::Always => Colour::Always,
+            When::Never => Colour::Never,
+        };
+        when.on()
+    }
+
+    fn warn(&self, warnings: &[Warning]) {
+        if !self.quiet || self.strict {
+            for warning in warnings {
+                eprint!("{}", render_warning(warning, self.colour()));
+            }
+        }
+    }
+}
+
+/// How a command that did not fail ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ending {
+    Ok,
+    NotConverged,
+    Warned,
+    Interrupted,
+}
+
+impl Ending {
+    fn exit_code(self) -> u8 {
+        match self {
+            Ending::Ok => 0,
+            Ending::NotConverged => 4,
+            Ending::Warned => 5,
+            Ending::Interrupted => 130,
+        }
+    }
+}
+
+/// Parses the arguments of the process, does what they say, and returns its exit code.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let colour = cli.flags.colour();
+    match in_threads(cli) {
+        Ok(ending) => ExitCode::from(ending.exit_code()),
+        Err(error) => {
+            eprint!("{}", render_error(&error, colour));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Runs a command in a pool of its own, so that `--threads` holds for all parallel work.
+fn in_threads(cli: Cli) -> Result<Ending> {
+    let threads = cli.flags.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| Error::Io {
+        action: "start the threads of",
+        path: "risorius".into(),
+        source: std::io::Error::other(error),
+    })?;
+    pool.install(|| dispatch(&cli))
+}
+
+fn dispatch(cli: &Cli) -> Result<Ending> {
+    match &cli.command {
+        None => run::run(None, &cli.flags),
+        Some(Command::Run { problem }) => run::run(problem.as_deref(), &cli.flags),
+        Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
+        Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
+    }
+}

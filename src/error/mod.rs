@@ -372,6 +372,16 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
+    /// The recording has none of the frames that a fit asks for.
+    #[error("the recording has {count} frames, numbered from 0: none is left from frame {first} on")]
+    NoSuchFrames {
+        /// First frame asked for.
+        first: usize,
+        /// Frames of the recording.
+        count: usize,
+        /// The fit in the problem file.
+        place: Box<Place>,
+    },
     /// A marker lies far from the surface of the host.
     #[error(
         "marker `{name}` is {distance:.2} mm from the surface of the host, more than max_marker_distance_mm = {limit}"
@@ -610,6 +620,7 @@ impl Error {
             Error::UnitsLookWrong { .. } => "K001",
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
+            Error::NoSuchFrames { .. } => "K004",
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -691,6 +702,7 @@ impl Error {
                 "its nearest point on the surface is position_mm = [{:.3}, {:.3}, {:.3}]; or raise fit.max_marker_distance_mm",
                 foot[0], foot[1], foot[2]
             )),
+            Error::NoSuchFrames { .. } => Some("choose other frames: frames = { first = 0 }".into()),
             Error::InvertedMesh { .. } => Some("check sizes and the order of nodes: sizes must be positive".into()),
             Error::MuscleOutside(_) => Some("move or shrink the muscle until it lies inside the host".into()),
             Error::InvertedMuscle { .. } => Some("check the muscle's size and the order of its nodes".into()),
@@ -755,7 +767,8 @@ impl Error {
             | Error::NotNormalToAxis { place, .. }
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
-            | Error::MarkerFarFromSurface { place, .. } => Some(place),
+            | Error::MarkerFarFromSurface { place, .. }
+            | Error::NoSuchFrames { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
             _ => None,
         }

@@ -55,9 +55,8 @@ pub fn bounded_step(h: &DMatrix<f64>, g: &[f64], lower: &[f64], upper: &[f64]) -
     let (x, z, slack) = (&solver.solution.x, &solver.solution.z, &solver.solution.s);
     // rows of the constraints: first upper bounds, then lower; an active one has a multiplier larger than its slack
     let active = |row: usize| z[row] > slack[row];
-    let fixed: Vec<Option<f64>> = (0..n)
-        .map(|i| if active(i) { Some(upper[i]) } else { active(n + i).then_some(lower[i]) })
-        .collect();
+    let fixed: Vec<Option<f64>> =
+        (0..n).map(|i| if active(i) { Some(upper[i]) } else { active(n + i).then_some(lower[i]) }).collect();
     let inside = |d: &[f64]| d.iter().zip(lower).zip(upper).all(|((d, l), u)| (l..=u).contains(&d));
     match on_active_set(h, g, &fixed) {
         Some(exact) if inside(&exact) => Ok(exact),

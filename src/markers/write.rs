@@ -7,7 +7,7 @@ use std::path::Path;
 use mcap::records::MessageHeader;
 use serde::Serialize;
 
-use super::recording::Recording;
+use super::recording::Frame;
 use crate::scene::Units;
 use crate::{Error, Result};
 
@@ -89,20 +89,22 @@ struct Marker<'a> {
     position: Option<[f64; 3]>,
 }
 
-/// Writes a recording as `risorius.Markers`, with checksums and statistics. The same recording gives the same bytes.
+/// Writes markers as `risorius.Markers`, with checksums and statistics. The same markers give the same bytes.
+///
+/// `names`: one per marker; `frames`: positions in that order.
 ///
 /// A missing or not finite position becomes `null`. In millimetres every bit of a position comes back; in other units
 /// it may change by one rounding. Log and publish time are the stamp, or 0 for a stamp before 1970.
 ///
 /// Errors: M013 (a frame does not fit the labels), O001 (the file cannot be written).
-pub fn write_json(path: &Path, recording: &Recording, options: &WriteOptions) -> Result<()> {
-    let labels = recording.labels.len();
-    for (frame, positions) in recording.frames.iter().map(|frame| frame.positions_mm.len()).enumerate() {
+pub fn write_json(path: &Path, names: &[String], frames: &[Frame], options: &WriteOptions) -> Result<()> {
+    let labels = names.len();
+    for (frame, positions) in frames.iter().map(|frame| frame.positions_mm.len()).enumerate() {
         if positions != labels {
             return Err(Error::FrameShape { frame, positions, labels });
         }
     }
-    encode(recording, options).and_then(|bytes| std::fs::write(path, bytes)).map_err(|source| Error::Io {
+    encode(names, frames, options).and_then(|bytes| std::fs::write(path, bytes)).map_err(|source| Error::Io {
         action: "write",
         path: path.into(),
         source,
@@ -110,7 +112,7 @@ pub fn write_json(path: &Path, recording: &Recording, options: &WriteOptions) ->
 }
 
 /// The bytes of the file.
-fn encode(recording: &Recording, options: &WriteOptions) -> std::result::Result<Vec<u8>, IoError> {
+fn encode(names: &[String], frames: &[Frame], options: &WriteOptions) -> std::result::Result<Vec<u8>, IoError> {
     let compression = match options.compression {
         Compression::None => None,
         Compression::Lz4 => Some(mcap::Compression::Lz4),
@@ -126,10 +128,10 @@ fn encode(recording: &Recording, options: &WriteOptions) -> std::result::Result<
     let schema = writer.add_schema(SCHEMA_NAME, "jsonschema", SCHEMA.as_bytes()).map_err(IoError::other)?;
     let metadata = BTreeMap::from([("unit".to_string(), options.units.name().to_string())]);
     let channel = writer.add_channel(schema, &options.topic, "json", &metadata).map_err(IoError::other)?;
-    for (sequence, frame) in recording.frames.iter().enumerate() {
+    for (sequence, frame) in frames.iter().enumerate() {
         let scaled = |position: [f64; 3]| position.map(|coordinate| coordinate / options.units.mm());
         let finite = |position: &[f64; 3]| position.iter().all(|coordinate| coordinate.is_finite());
-        let markers = recording.labels.iter().zip(&frame.positions_mm);
+        let markers = names.iter().zip(&frame.positions_mm);
         let stamp = frame.stamp_ns;
         let message = Message {
             stamp: Stamp { sec: stamp.div_euclid(1_000_000_000), nsec: stamp.rem_euclid(1_000_000_000) },

@@ -15,6 +15,7 @@ pub mod frame;
 pub mod machine;
 pub mod manifest;
 pub mod pvd;
+pub mod record;
 pub mod run_folder;
 pub mod status;
 pub mod summary;
@@ -24,6 +25,7 @@ pub mod vtu;
 
 pub use frame::{Frame, MarkerPair, MuscleState, Probe, ProbeState, muscle_states, probe_states};
 pub use manifest::{Input, Manifest};
+pub use record::Record;
 pub use run_folder::RunFolder;
 pub use status::{FailedFrame, Outcome, Status};
 pub use view::View;

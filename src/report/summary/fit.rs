@@ -2,22 +2,12 @@
 
 use super::marker_errors::MarkerErrors;
 use super::{columns, count, optional};
+use crate::fit::covariance::Bound;
 use crate::report::frame::Frame;
 use std::fmt;
 
 /// Markers shown as the worst.
 const WORST: usize = 5;
-
-/// Whether a control ended at a bound.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Bound {
-    /// Between its bounds.
-    Free,
-    /// At the lower one.
-    Lower,
-    /// At the upper one.
-    Upper,
-}
 
 /// The controls of a frame, one entry per control in each list.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ mod fit;
 mod forward;
 mod marker_errors;
 
-pub use fit::{Bound, FitSummary, FittedFrame};
+pub use fit::{FitSummary, FittedFrame};
 pub use forward::ForwardSummary;
 pub use marker_errors::{ErrorsOf, MarkerErrors};
 

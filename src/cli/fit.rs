@@ -1,0 +1,100 @@
+//! Task `fit`: activations from a recording, frame after frame.
+
+use super::Flags;
+use super::forward::probes;
+use super::progress::Meter;
+use super::run::{Run, Tally};
+use crate::cli::diagnostics::render_error;
+use crate::error::Result;
+use crate::fit::{Estimate, Fit};
+use crate::forward::Work;
+use crate::markers::Recording;
+use crate::model::build::Built;
+use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
+use crate::report::{FailedFrame, Frame, MarkerPair, Record};
+use crate::scene::{FitSpec, Scene};
+
+/// Fits every frame, writes it, prints the page.
+#[allow(clippy::too_many_arguments)] // the parts of one command, each of another kind
+pub(super) fn fit(
+    scene: &Scene,
+    spec: &FitSpec,
+    built: &Built,
+    recording: &Recording,
+    frames: &[usize],
+    run: &Run,
+    flags: &Flags,
+    work: &mut Work,
+) -> Result<Tally> {
+    let model = &built.model;
+    let probes = probes(scene, built);
+    let mut fit = Fit::new(model, scene, spec, recording)?;
+    let names: Vec<String> = fit.markers().iter().map(|m| m.name.clone()).collect();
+    let mut record = Record::create(&run.folder, model, &probes, &scene.output, true)?;
+    let mut meter = Meter::new(flags, frames.len());
+    let mut tally = Tally::default();
+    let mut fitted = Vec::new();
+    let mut errors = MarkerErrors::default();
+    for &index in frames {
+        if run.is_interrupted() {
+            tally.interrupted = true;
+            break;
+        }
+        let frame = Frame { index, time_s: recording.frames[index].time_s };
+        let before = fit.work().linear.factorisations;
+        match fit.frame(recording, index) {
+            Ok(estimate) => {
+                let markers = pairs(&names, &estimate);
+                errors.add(frame, &markers);
+                record.frame(frame, &estimate.equilibrium, &estimate.sd, &markers)?;
+                tally.frames_ok += 1;
+                meter.frame(format!(
+                    "t {:.3} s: rms {:.3} mm, {} steps, {} factorisations",
+                    frame.time_s,
+                    estimate.rms_mm,
+                    estimate.iterations.len(),
+                    fit.work().linear.factorisations - before
+                ));
+                fitted.push(FittedFrame {
+                    frame,
+                    values: estimate.equilibrium.state.controls.clone(),
+                    deviations: estimate.sd.clone(),
+                    bounds: estimate.bounds.clone(),
+                });
+            }
+            Err(error) => {
+                meter.say(&render_error(&error, flags.colour()));
+                meter.frame(format!("t {:.3} s: failed", frame.time_s));
+                tally.failed.push(FailedFrame::new(index, &error));
+            }
+        }
+        run.write_running(&tally)?;
+    }
+    meter.finish();
+    *work = fit.work();
+    record.finish(work)?;
+    let controls: Vec<&str> = model.controls().iter().map(|c| c.name.as_str()).collect();
+    let summary = FitSummary {
+        name: &scene.name,
+        controls: &controls,
+        frames: &fitted,
+        frames_failed: tally.failed.len(),
+        errors: &errors,
+        iterations: work.iterations,
+        seconds: run.start.elapsed().as_secs_f64(),
+        folder: &run.folder.path().display().to_string(),
+    };
+    let page = summary.to_string();
+    run.folder.write("summary.txt", &page)?;
+    print!("{page}");
+    Ok(tally)
+}
+
+fn pairs<'n>(names: &'n [String], estimate: &Estimate) -> Vec<MarkerPair<'n>> {
+    names
+        .iter()
+        .zip(&estimate.positions_mm)
+        .zip(&estimate.measured_mm)
+        .map(|((name, model), measured)| MarkerPair { name, model: *model, measured: *measured })
+        .collect()
+}

@@ -1,0 +1,80 @@
+//! Where a problem comes from: a file, or the one that is built in.
+
+use super::Flags;
+use crate::error::{Error, Result, Warning};
+use crate::markers::{ReadOptions, Recording, read, read_bytes};
+use crate::scene::{FitSpec, Scene};
+use std::path::Path;
+
+/// The problem that runs without a file.
+const PROBLEM: &str = include_str!("../../problems/beam/problem.toml");
+/// Its recording.
+const RECORDING: &[u8] = include_bytes!("../../data/beam.mcap");
+/// What messages about it call the file.
+const NAME: &str = "beam/problem.toml (built in)";
+
+/// A scene and how to read its recording.
+pub(super) struct Source {
+    pub scene: Scene,
+    built_in: bool,
+}
+
+impl Source {
+    /// Reads a problem file, or the built-in problem, with the `--set` overrides.
+    pub fn read(path: Option<&Path>, flags: &Flags) -> Result<Source> {
+        match path {
+            Some(path) => Ok(Source { scene: Scene::read(path, &flags.set)?, built_in: false }),
+            None => {
+                let mut scene = Scene::parse(PROBLEM, NAME, Path::new("problems/beam"), &flags.set)?;
+                "beam".clone_into(&mut scene.name);
+                Ok(Source { scene, built_in: true })
+            }
+        }
+    }
+
+    /// Reads the recording that a fit names.
+    pub fn recording(&self, fit: &FitSpec) -> Result<Recording> {
+        let options = ReadOptions {
+            topic: fit.topic.clone(),
+            units: fit.units,
+            zero_is_missing: fit.zero_is_missing,
+            ..ReadOptions::default()
+        };
+        if self.embeds(fit) { read_bytes(&fit.markers, RECORDING, &options) } else { read(&fit.markers, &options) }
+    }
+
+    /// The recording as bytes, if it is the built-in one: a run keeps a copy, so that its lock file can be run again.
+    pub fn embedded_recording(&self, fit: &FitSpec) -> Option<&'static [u8]> {
+        self.embeds(fit).then_some(RECORDING)
+    }
+
+    /// The built-in problem uses the built-in recording unless `--set fit.markers` names another.
+    fn embeds(&self, fit: &FitSpec) -> bool {
+        self.built_in && fit.markers.ends_with("data/beam.mcap")
+    }
+}
+
+/// What a recording warns of, as messages.
+pub(super) fn recording_warnings(recording: &Recording) -> Vec<Warning> {
+    let message = |warning: &crate::markers::Warning| Warning {
+        code: "M020",
+        message: format!("{}: {warning}", recording.source.path.display()),
+        place: None,
+        help: None,
+    };
+    recording.health.warnings.iter().map(message).collect()
+}
+
+/// The frames of a recording that a fit asks for.
+///
+/// # Errors
+/// Where none is left.
+pub(super) fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>> {
+    let count = recording.frames.len();
+    let end = fit.frames.last.map_or(count, |last| (last + 1).min(count));
+    let frames: Vec<usize> = (fit.frames.first..end).step_by(fit.frames.step).collect();
+    if frames.is_empty() {
+        return Err(Error::NoSuchFrames { first: fit.frames.first, count, place: Box::new(fit.place.clone()) });
+    }
+    Ok(frames)
+}

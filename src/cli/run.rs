@@ -1,0 +1,171 @@
+//! `risorius run [problem.toml]`: does what the problem's task says, and leaves a run folder.
+
+use super::check::describe;
+use super::problem::{Source, chosen_frames, recording_warnings};
+use super::{Ending, Flags, fit, forward};
+use crate::error::{Error, Result};
+use crate::forward::Work;
+use crate::markers::Recording;
+use crate::model::Model;
+use crate::model::build::{Built, build};
+use crate::report::manifest::Input;
+use crate::report::{FailedFrame, Manifest, RunFolder, Status};
+use crate::scene::{ControlValue, FitSpec, Task};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// What a task needs besides the scene.
+pub(super) struct Run {
+    pub folder: RunFolder,
+    pub start: Instant,
+    inputs: Vec<Input>,
+    interrupted: Arc<AtomicBool>,
+}
+
+/// How the frames of a run ended.
+#[derive(Default)]
+pub(super) struct Tally {
+    pub frames_ok: usize,
+    pub failed: Vec<FailedFrame>,
+    pub interrupted: bool,
+}
+
+impl Run {
+    /// Whether Ctrl-C was pressed.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
+    }
+
+    /// Writes how the run stands.
+    pub fn write_running(&self, tally: &Tally) -> Result<()> {
+        Status::running(tally.frames_ok, tally.failed.clone()).write(&self.folder)
+    }
+
+    fn manifest(&self, model: &Model, work: &Work) -> Result<()> {
+        let command = std::env::args().collect();
+        let seconds = self.start.elapsed().as_secs_f64();
+        let threads = rayon::current_num_threads();
+        Manifest::now(command, self.inputs.clone(), threads, Some(model), work, seconds).write(&self.folder)
+    }
+}
+
+pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
+    let start = Instant::now();
+    let mut source = Source::read(path, flags)?;
+    let built = build(&source.scene)?;
+    let mut warnings = source.scene.warnings.clone();
+    warnings.extend(built.warnings.iter().cloned());
+    // the recording is read before anything is written: a mistake in it leaves no folder behind
+    let clip = match (source.scene.task, &source.scene.fit) {
+        (Task::Fit, Some(fit)) => {
+            let recording = source.recording(fit)?;
+            warnings.extend(recording_warnings(&recording));
+            let frames = chosen_frames(fit, &recording)?;
+            Some((recording, frames))
+        }
+        _ => None,
+    };
+    flags.warn(&warnings);
+    if flags.strict && !warnings.is_empty() {
+        return Ok(Ending::Warned);
+    }
+    if !flags.quiet {
+        eprint!("{}", describe(&source.scene, &built.model));
+    }
+    if flags.dry_run {
+        return Ok(Ending::Ok);
+    }
+
+    let folder = match &flags.out {
+        Some(path) => RunFolder::create_at(path, flags.force)?,
+        None => RunFolder::create(Path::new("runs"), &source.scene.name)?,
+    };
+    let mut inputs = Vec::new();
+    for path in path.into_iter().map(Path::to_path_buf).chain(input_files(&source)) {
+        inputs.push(Input::read(&path)?);
+    }
+    keep_recording(&mut source, &folder, &mut inputs)?;
+    folder.write("problem.lock.toml", source.scene.lock())?;
+    let run = Run { folder, start, inputs, interrupted: watch_interrupt() };
+    run.write_running(&Tally::default())?;
+
+    let mut work = Work::default();
+    let outcome = task(&source, &built, clip, &run, flags, &mut work);
+    finish(&run, &built.model, &work, outcome)
+}
+
+fn task(
+    source: &Source,
+    built: &Built,
+    clip: Option<(Recording, Vec<usize>)>,
+    run: &Run,
+    flags: &Flags,
+    work: &mut Work,
+) -> Result<Tally> {
+    match (clip, &source.scene.fit) {
+        (Some((recording, frames)), Some(spec)) => {
+            fit::fit(&source.scene, spec, built, &recording, &frames, run, flags, work)
+        }
+        _ => forward::forward(&source.scene, built, run, flags, work),
+    }
+}
+
+/// Writes status and manifest whatever happened, and says how the command ends.
+fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>) -> Result<Ending> {
+    run.manifest(model, work)?;
+    match outcome {
+        Ok(tally) => {
+            let Tally { frames_ok, failed, interrupted } = tally;
+            let converged = failed.is_empty();
+            if interrupted {
+                Status::interrupted(frames_ok, failed).write(&run.folder)?;
+                return Ok(Ending::Interrupted);
+            }
+            Status::finished(frames_ok, failed).write(&run.folder)?;
+            Ok(if converged { Ending::Ok } else { Ending::NotConverged })
+        }
+        Err(error) => {
+            Status::failed(0, Vec::new(), &error).write(&run.folder)?;
+            Err(error)
+        }
+    }
+}
+
+/// Files that the scene names and that are read from disk.
+fn input_files(source: &Source) -> Vec<PathBuf> {
+    let scene = &source.scene;
+    let curves = scene.controls.iter().filter_map(|c| match &c.value {
+        ControlValue::Csv(path) => Some(path.clone()),
+        ControlValue::Constant(_) => None,
+    });
+    let markers = scene.fit.iter().filter(|f| scene.task == Task::Fit && source.embedded_recording(f).is_none());
+    let mut files: Vec<PathBuf> = curves.chain(markers.map(|f| f.markers.clone())).collect();
+    files.sort();
+    files.dedup();
+    files
+}
+
+/// A run of the built-in problem keeps its recording, and its lock file points there.
+fn keep_recording(source: &mut Source, folder: &RunFolder, inputs: &mut Vec<Input>) -> Result<()> {
+    let Some(bytes) = source.scene.fit.as_ref().and_then(|f| source.embedded_recording(f)) else { return Ok(()) };
+    folder.write("recording.mcap", bytes)?;
+    let path = folder.path().join("recording.mcap");
+    let path = std::path::absolute(&path).map_err(|error| Error::Io { action: "find", path, source: error })?;
+    inputs.push(Input::read(&path)?);
+    if let Some(FitSpec { markers, .. }) = &mut source.scene.fit {
+        *markers = path;
+    }
+    Ok(())
+}
+
+/// Set by Ctrl-C, looked at between frames. A second handler cannot be set in one process; then Ctrl-C ends it at once.
+fn watch_interrupt() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&flag);
+    if ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed)).is_err() {
+        eprintln!("note: Ctrl-C will end the run at once");
+    }
+    flag
+}
