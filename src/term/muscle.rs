@@ -163,7 +163,16 @@ impl Point {
     /// v = F n0 from the local parameters of x in the point's host element; |v| is the stretch.
     #[inline(always)]
     pub fn deformed_fibre(&self, x: &[[f64; 64]; 3]) -> Vector {
-        std::array::from_fn(|i| (0..64).map(|a| x[i][a] * self.gradient[a]).sum())
+        // eight partial sums, so that the sum does not wait for itself
+        std::array::from_fn(|i| {
+            let mut partial = [0.0; 8];
+            for (x, g) in x[i].chunks_exact(8).zip(self.gradient.chunks_exact(8)) {
+                for l in 0..8 {
+                    partial[l] += x[l] * g[l];
+                }
+            }
+            partial.iter().sum()
+        })
     }
 }
 
@@ -199,29 +208,9 @@ impl Term for Muscle {
     }
 
     fn add(&self, state: &ElementState<'_>, want: Want, system: &mut ElementSystem) -> Contribution {
-        let mut energy = 0.0;
-        for point in self.points_in(state.element) {
-            let v = point.deformed_fibre(state.x);
-            let lambda = norm(v);
-            let n = v.map(|c| c / lambda);
-            let tension = self.law.tension(lambda, state.controls[self.control[0]]);
-            energy += point.weight * tension.energy;
-            for i in 0..3 {
-                let force = point.weight * tension.force * n[i];
-                for (target, g) in system.force[i].iter_mut().zip(&point.gradient) {
-                    *target += force * g;
-                }
-            }
-            if want == Want::Stiffness {
-                let across = tension.force / lambda;
-                let blocks = PAIRS.map(|(i, k)| {
-                    let d = (tension.slope - across) * n[i] * n[k] + if i == k { across } else { 0.0 };
-                    point.weight * d
-                });
-                self.arch.dispatch(RankOne { blocks, gradient: &point.gradient, stiffness: &mut system.stiffness });
-            }
-        }
-        Contribution { energy, det_f: None }
+        let points = self.points_in(state.element);
+        let activation = state.controls[self.control[0]];
+        self.arch.dispatch(Add { law: &self.law, activation, points, state, want, system })
     }
 
     fn add_control_force(&self, control: usize, state: &ElementState<'_>, force: &mut [[f64; 64]; 3]) {
@@ -241,23 +230,80 @@ impl Term for Muscle {
     }
 }
 
-/// stiffness[pair] += blocks[pair] g g^T, compiled once per instruction set.
-struct RankOne<'a> {
-    blocks: [f64; 6],
-    gradient: &'a [f64; 64],
-    stiffness: &'a mut [[f64; 4096]],
+/// [`Term::add`] for the points of one element, compiled once per instruction set.
+struct Add<'a> {
+    law: &'a Blemker,
+    activation: f64,
+    points: &'a [Point],
+    state: &'a ElementState<'a>,
+    want: Want,
+    system: &'a mut ElementSystem,
 }
 
-impl WithSimd for RankOne<'_> {
-    type Output = ();
+impl WithSimd for Add<'_> {
+    type Output = Contribution;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        for (block, scale) in self.stiffness.iter_mut().zip(self.blocks) {
-            for (row, g) in block.chunks_exact_mut(64).zip(self.gradient) {
-                let factor = scale * g;
-                for (target, g) in row.iter_mut().zip(self.gradient) {
-                    *target += factor * g;
+    fn with_simd<S: Simd>(self, _: S) -> Contribution {
+        let mut energy = 0.0;
+        // w D of every point, for each pair of components
+        let mut weighted: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::with_capacity(self.points.len()));
+        for point in self.points {
+            let v = point.deformed_fibre(self.state.x);
+            let lambda = norm(v);
+            let n = v.map(|c| c / lambda);
+            let tension = self.law.tension(lambda, self.activation);
+            energy += point.weight * tension.energy;
+            for i in 0..3 {
+                let force = point.weight * tension.force * n[i];
+                for (target, g) in self.system.force[i].iter_mut().zip(&point.gradient) {
+                    *target += force * g;
+                }
+            }
+            let across = tension.force / lambda;
+            for (values, (i, k)) in weighted.iter_mut().zip(PAIRS) {
+                let d = (tension.slope - across) * n[i] * n[k] + if i == k { across } else { 0.0 };
+                values.push(point.weight * d);
+            }
+        }
+        if self.want == Want::Stiffness {
+            for (block, values) in self.system.stiffness.iter_mut().zip(&weighted) {
+                if S::IS_SCALAR {
+                    add_outer_products::<false>(self.points, values, block);
+                } else {
+                    add_outer_products::<true>(self.points, values, block);
+                }
+            }
+        }
+        Contribution { energy, det_f: None }
+    }
+}
+
+/// block += sum over points d g g^T. The sum is symmetric: rows are done in tiles of eight, from the diagonal tile on, and
+/// mirrored.
+#[inline(always)]
+fn add_outer_products<const FMA: bool>(points: &[Point], values: &[f64], block: &mut [f64; 4096]) {
+    const TILE: usize = 8;
+    for row_tile in 0..64 / TILE {
+        for column_tile in row_tile..64 / TILE {
+            let mut sum = [[0.0; TILE]; TILE];
+            for (point, d) in points.iter().zip(values) {
+                let rows = &point.gradient[row_tile * TILE..][..TILE];
+                let columns = &point.gradient[column_tile * TILE..][..TILE];
+                for (sum, row) in sum.iter_mut().zip(rows) {
+                    let factor = d * row;
+                    for (sum, column) in sum.iter_mut().zip(columns) {
+                        *sum = if FMA { factor.mul_add(*column, *sum) } else { *sum + factor * column };
+                    }
+                }
+            }
+            for (a, row) in sum.iter().enumerate() {
+                for (b, value) in row.iter().enumerate() {
+                    let (a, b) = (row_tile * TILE + a, column_tile * TILE + b);
+                    block[64 * a + b] += value;
+                    if column_tile > row_tile {
+                        block[64 * b + a] += value;
+                    }
                 }
             }
         }
