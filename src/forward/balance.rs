@@ -103,6 +103,11 @@ impl<'m> Balance<'m> {
         self.evaluate(state, Want::Force, None)
     }
 
+    /// Whether a tangent and a factor near it are at hand, from the last iteration or the last sensitivities.
+    pub fn has_tangent(&self) -> bool {
+        self.factored
+    }
+
     /// Negative eigenvalues beyond one per pressure at the last factorisation.
     pub fn negative_modes(&self) -> Option<usize> {
         let pressures = self.model.numbering().pressures();

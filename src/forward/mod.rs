@@ -5,7 +5,7 @@ mod balance;
 use crate::error::{Error, Result};
 use crate::math::factor;
 use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
-use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, newton};
+use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
 use balance::Balance;
@@ -15,6 +15,8 @@ use std::time::Instant;
 const FIRST_STEP: f64 = 0.5;
 /// A Newton step that must be damped below this is left for a shorter step of the path.
 const DAMPING: f64 = 0.1;
+/// Corrections with the tangent at hand before a new one is made.
+const CHORD_ITERATIONS: usize = 8;
 /// Iterations that a guess is given before the path is walked instead.
 const NEAR_ITERATIONS: usize = 8;
 /// Below this length a step onto a saddle is believed.
@@ -181,6 +183,12 @@ impl<'m> Solver<'m> {
     ) -> std::result::Result<Equilibrium, Box<Failure>> {
         self.balance.set_target(to.clone());
         let guess = self.balance.at_target(guess.clone());
+        if self.balance.has_tangent() {
+            let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0 };
+            if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
+                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+            }
+        }
         let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), damping: DAMPING };
         if let Ok(outcome) = newton(&mut self.balance, guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;

@@ -194,3 +194,33 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
     };
     Ok(Outcome { state, last: now, iterations, stop })
 }
+
+/// Corrections with a tangent from nearby go on while each is smaller than the one before by this factor.
+const CHORD_CONTRACTION: f64 = 0.5;
+
+/// Solves r(x) = 0 near a state whose tangent is at hand: corrections c = - K^-1 r(x) with that one tangent (the chord
+/// method), without a new factorisation. `None` where they do not contract; the caller then has Newton's method.
+///
+/// # Errors
+/// Where a linear system cannot be solved.
+pub fn chord<E: Equations>(equations: &mut E, start: E::State, limits: Limits) -> Result<Option<Outcome<E::State>>> {
+    let mut state = start;
+    let mut now = equations.assess(&state);
+    let mut iterations = Vec::new();
+    let mut last_size = f64::INFINITY;
+    while !now.converged() {
+        if !now.admissible || iterations.len() >= limits.iterations {
+            return Ok(None);
+        }
+        let correction = equations.correction()?;
+        let size = equations.size(&correction, 0.0, &correction);
+        if size > CHORD_CONTRACTION * last_size {
+            return Ok(None);
+        }
+        state = equations.advance(&state, &correction, 1.0);
+        iterations.push(Iteration { residual: now.residual, required: now.required, factor: 1.0, corrections: 1 });
+        now = equations.assess(&state);
+        last_size = size;
+    }
+    Ok(Some(Outcome { state, last: now, iterations, stop: None }))
+}

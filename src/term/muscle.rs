@@ -267,11 +267,13 @@ impl WithSimd for Add<'_> {
             }
         }
         if self.want == Want::Stiffness {
+            let gradients: Vec<[f64; 64]> = self.points.iter().map(|p| p.gradient).collect();
+            let mut scaled = Vec::with_capacity(gradients.len());
             for (block, values) in self.system.stiffness.iter_mut().zip(&weighted) {
                 if S::IS_SCALAR {
-                    add_outer_products::<false>(self.points, values, block);
+                    add_outer_products::<false>(&gradients, values, &mut scaled, block);
                 } else {
-                    add_outer_products::<true>(self.points, values, block);
+                    add_outer_products::<true>(&gradients, values, &mut scaled, block);
                 }
             }
         }
@@ -279,29 +281,44 @@ impl WithSimd for Add<'_> {
     }
 }
 
-/// block += sum over points d g g^T. The sum is symmetric: rows are done in tiles of eight, from the diagonal tile on, and
-/// mirrored.
+/// block += sum over points d g g^T. The sum is symmetric: tiles of 4 x 8 are done from the diagonal on and mirrored. A tile
+/// is small enough to stay in registers while it runs over the points.
 #[inline(always)]
-fn add_outer_products<const FMA: bool>(points: &[Point], values: &[f64], block: &mut [f64; 4096]) {
-    const TILE: usize = 8;
-    for row_tile in 0..64 / TILE {
-        for column_tile in row_tile..64 / TILE {
-            let mut sum = [[0.0; TILE]; TILE];
-            for (point, d) in points.iter().zip(values) {
-                let rows = &point.gradient[row_tile * TILE..][..TILE];
-                let columns = &point.gradient[column_tile * TILE..][..TILE];
-                for (sum, row) in sum.iter_mut().zip(rows) {
-                    let factor = d * row;
-                    for (sum, column) in sum.iter_mut().zip(columns) {
-                        *sum = if FMA { factor.mul_add(*column, *sum) } else { *sum + factor * column };
+fn add_outer_products<const FMA: bool>(
+    gradients: &[[f64; 64]],
+    values: &[f64],
+    scaled: &mut Vec<[f64; 64]>,
+    block: &mut [f64; 4096],
+) {
+    const ROWS: usize = 4;
+    const COLUMNS: usize = 8;
+    scaled.clear();
+    scaled.extend(gradients.iter().zip(values).map(|(g, d)| g.map(|g| d * g)));
+    for first_row in (0..64).step_by(ROWS) {
+        for first_column in ((first_row / COLUMNS) * COLUMNS..64).step_by(COLUMNS) {
+            let mut sum = [[0.0; COLUMNS]; ROWS];
+            for (scaled, gradient) in scaled.iter().zip(gradients) {
+                let mut rows = [0.0; ROWS];
+                rows.copy_from_slice(&scaled[first_row..first_row + ROWS]);
+                let mut columns = [0.0; COLUMNS];
+                columns.copy_from_slice(&gradient[first_column..first_column + COLUMNS]);
+                for a in 0..ROWS {
+                    for b in 0..COLUMNS {
+                        sum[a][b] = if FMA {
+                            rows[a].mul_add(columns[b], sum[a][b])
+                        } else {
+                            sum[a][b] + rows[a] * columns[b]
+                        };
                     }
                 }
             }
+            // the two tiles that share a diagonal square fill it; the others are mirrored
+            let mirrored = first_column > first_row;
             for (a, row) in sum.iter().enumerate() {
                 for (b, value) in row.iter().enumerate() {
-                    let (a, b) = (row_tile * TILE + a, column_tile * TILE + b);
+                    let (a, b) = (first_row + a, first_column + b);
                     block[64 * a + b] += value;
-                    if column_tile > row_tile {
+                    if mirrored {
                         block[64 * b + a] += value;
                     }
                 }
