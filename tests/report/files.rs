@@ -10,6 +10,7 @@ use risorius::report::{FailedFrame, Input, Manifest, Outcome, RunFolder, Status}
 use risorius::term::pressure::Trilinear;
 use std::collections::HashSet;
 use std::fs;
+
 #[test]
 fn run_folders_are_numbered_and_shared_by_nobody() {
     let folder = temporary();

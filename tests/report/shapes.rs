@@ -11,6 +11,7 @@ use risorius::report::vtu::{Field, Grid};
 use risorius::report::{Frame, View, muscle_states};
 use risorius::term::pressure::{DiscontinuousTrilinear, PRESSURE_SPACES, Trilinear};
 use std::fs;
+
 /// The 64 points of a cubic Bezier hexahedron as VTK orders them: i, j, k of each.
 const DOCUMENTED_ORDER: &str = "
     000 300 330 030 003 303 333 033

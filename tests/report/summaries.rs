@@ -6,6 +6,7 @@ use risorius::mesh::MaterialPoint;
 use risorius::report::summary::{Bound, FitSummary, FittedFrame, ForwardSummary, MarkerErrors};
 use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
+
 #[test]
 fn forward_summary_shows_the_last_frame() {
     let model = model(&Trilinear);

@@ -3,6 +3,7 @@
 use risorius::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use risorius::model::Model;
 use risorius::report::{Frame, MarkerPair, RunFolder};
+
 pub const FRAME: Frame = Frame { index: 3, time_s: 0.1 + 0.2 };
 
 pub fn run_in(folder: &tempfile::TempDir) -> RunFolder {

@@ -10,6 +10,7 @@ use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
 use std::fs;
 use std::path::Path;
+
 /// The rows of a table by RFC 4180.
 fn read_csv(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
