@@ -64,7 +64,7 @@ impl fmt::Display for FitSummary<'_> {
 
 impl FitSummary<'_> {
     fn of_frame(&self, fitted: &FittedFrame, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(out, "\nframe {} at {} s", fitted.frame.index, fitted.frame.time_s)?;
+        writeln!(out, "\nframe {} at {:.3} s", fitted.frame.index, fitted.frame.time_s)?;
         let row = |(control, name): (usize, &&str)| {
             let bound = match fitted.bounds[control] {
                 Bound::Free => "",
@@ -97,7 +97,7 @@ impl FitSummary<'_> {
             ]
         };
         let rows: Vec<_> = self.controls.iter().enumerate().map(row).collect();
-        let header = ["muscle", "least", "peak", "sd there", "in frame", "frames at lower", "at upper bound"];
+        let header = ["muscle", "least", "peak", "sd there", "in frame", "frames at lower", "frames at upper bound"];
         out.write_str(&columns(header, &rows))
     }
 

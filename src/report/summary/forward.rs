@@ -48,7 +48,7 @@ impl fmt::Display for ForwardSummary<'_> {
         if *frames_ok == 0 {
             return Ok(());
         }
-        writeln!(out, "\nframe {} at {} s", frame.index, frame.time_s)?;
+        writeln!(out, "\nframe {} at {:.3} s", frame.index, frame.time_s)?;
         let three = |v: [f64; 3]| v.map(|c| format!("{c:.4}"));
         let probes = self.probes.iter().map(|probe| {
             let ([x, y, z], [ux, uy, uz]) = (three(probe.position), three(probe.displacement));
