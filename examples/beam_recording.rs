@@ -22,9 +22,13 @@ const START_NS: i64 = 1_767_225_600_000_000_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let finer = "mesh.block={origin_mm=[0,0,0], size_mm=[60,20,20], elements=[12,4,4]}".to_owned();
+    let finer = [
+        "mesh.block={origin_mm=[0,0,0], size_mm=[60,20,20], elements=[12,4,4]}".to_owned(),
+        "muscle.top.gauss=6".to_owned(),
+        "muscle.bottom.gauss=6".to_owned(),
+    ];
     let text = std::fs::read_to_string(root.join("problems/beam/problem.toml"))?;
-    let scene = Scene::parse(&text, "problems/beam/problem.toml", &root.join("problems/beam"), &[finer])?;
+    let scene = Scene::parse(&text, "problems/beam/problem.toml", &root.join("problems/beam"), &finer)?;
     let model = risorius::model::build::build(&scene)?.model;
     let surface = Surface::new(model.mesh());
     let places: Vec<MaterialPoint> =
@@ -62,12 +66,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Activations (top, bottom) at t in [0, 1]: two overlapping bumps, 5 % and 8 % at their peaks.
+/// Activations (top, bottom) at t in [0, 1]: two overlapping bumps, 1.2 % and 2 % at their peaks.
 fn activations(t: f64) -> [f64; 2] {
     let bump = |from: f64, to: f64| {
         if (from..=to).contains(&t) { (PI * (t - from) / (to - from)).sin().powi(2) } else { 0.0 }
     };
-    [0.05 * bump(0.0, 0.7), 0.08 * bump(0.3, 1.0)]
+    [0.012 * bump(0.0, 0.7), 0.02 * bump(0.3, 1.0)]
 }
 
 /// A small deterministic generator (PCG, O'Neill 2014), so that the recording is the same on every machine.
