@@ -103,28 +103,28 @@ fn bending_without_kappa_is_stable() {
     assert!(found.evaluation.det_f.min > 0.0);
 }
 
-/// A load that no tissue bears: the failure says how far it came, and what it kept is an equilibrium.
+/// Loads out of reach: the failure says how far it came, and what it kept is an equilibrium. Bending meets them with its
+/// first step (one of 0.01 kPa, the shortest allowed, is too long); compression crushes the beam on the way.
 #[test]
 fn an_impossible_load_is_refused_with_its_numbers() {
-    for pull in [[0.0, 0.0, -100.0], [-100.0, 0.0, 0.0]] {
+    for (pull, comes_far) in [([0.0, 0.0, -100.0], false), ([-100.0, 0.0, 0.0], true)] {
         let model = cantilever(10.0, pull);
-        let settings = Settings { step_min: 1e-3, ..Settings::default() };
+        let settings = Settings::default();
         let mut solver = Solver::new(&model, settings).expect("memory");
-        let failure = solver
-            .equilibrium(&model.rest(), &Drive { controls: Vec::new(), load: 1.0 })
-            .err()
-            .expect("no equilibrium under 100 kPa");
+        let drive = Drive { controls: Vec::new(), load: 1.0 };
+        let Err(failure) = solver.equilibrium(&model.rest(), &drive) else { panic!("100 kPa were borne") };
         let Error::NotConverged { reached, cuts, step, element, point, det_f, residual, required, .. } =
             failure.error
         else {
             panic!("{}", failure.error)
         };
         assert!((0.0..1.0).contains(&reached) && reached == failure.reached, "reached {reached}");
-        assert!(cuts > 0 && step < 1e-3, "{cuts} cuts, step {step}");
+        assert!(cuts > 0 && step < settings.step_min, "{cuts} cuts, step {step}");
         assert!(element < 4 && point < 64 && det_f.is_finite(), "element {element}, point {point}, det F {det_f}");
         assert!(residual.is_nan() || residual > required, "residual {residual}, required {required}");
         assert_eq!(failure.last_good.load, reached);
-        if reached > 0.0 {
+        if comes_far {
+            assert!(reached > 0.05, "reached {reached}");
             assert!(imbalance(&model, &failure.last_good) < 1e-7);
         } else {
             assert_eq!(failure.last_good, model.rest());
