@@ -4,7 +4,7 @@
 //! face's own parameters without a derivative along d. Prescribing these prescribes the whole face exactly and leaves
 //! the derivatives through it free.
 
-use crate::math::tensor::{IDENTITY, Matrix, Vector, apply, cross, dot, normalised, rotation, subtract};
+use crate::math::tensor::{IDENTITY, Matrix, Vector, add_scaled, apply, cross, dot, normalised, rotation, subtract};
 use crate::mesh::Mesh;
 use crate::mesh::face::Face;
 
@@ -33,6 +33,15 @@ pub enum Support {
         through: Vector,
         /// Angle at full load, radians.
         angle: f64,
+    },
+    /// An affine motion u = load (gradient X + offset): a face is pulled, pushed or sheared.
+    Affine {
+        /// The faces.
+        faces: Vec<Face>,
+        /// du/dX at full load: `gradient[i][J]`, dimensionless.
+        gradient: Matrix,
+        /// Displacement of the origin at full load, mm.
+        offset: Vector,
     },
 }
 
@@ -137,12 +146,13 @@ impl Supports {
 impl Support {
     fn reach(&self) -> (&[Face], std::ops::Range<usize>) {
         match self {
-            Support::Clamp { faces } | Support::Rotate { faces, .. } => (faces, 0..3),
+            Support::Clamp { faces } | Support::Rotate { faces, .. } | Support::Affine { faces, .. } => (faces, 0..3),
             Support::Symmetry { faces, axis } => (faces, *axis..*axis + 1),
         }
     }
 
-    /// Displacement of a global parameter: u = (R - I)(X - c) for values, (R - I) X for derivatives.
+    /// Displacement of a global parameter: u = (R - I)(X - c) for values, (R - I) X for derivatives; likewise for an
+    /// affine motion.
     fn displacement(&self, mesh: &Mesh, parameter: usize, load: f64) -> Vector {
         match self {
             Support::Clamp { .. } | Support::Symmetry { .. } => [0.0; 3],
@@ -152,6 +162,11 @@ impl Support {
                 let x = mesh.parameters[parameter];
                 let value = mesh.parameter_derivative[parameter] == 0;
                 apply(&turn, if value { subtract(x, *through) } else { x })
+            }
+            Support::Affine { gradient, offset, .. } => {
+                let x = mesh.parameters[parameter];
+                let value = f64::from(u8::from(mesh.parameter_derivative[parameter] == 0));
+                add_scaled(apply(gradient, x), value, *offset).map(|u| load * u)
             }
         }
     }

@@ -1,5 +1,9 @@
 //! Closed forms and solved cases from an independent implementation, one file each.
 
+mod free_contraction;
+mod patch_test;
 mod prescribed_state;
+mod rivlin_torsion;
 mod solved_cases;
 mod support;
+mod uniaxial_and_shear;

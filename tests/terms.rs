@@ -1,0 +1,408 @@
+//! Every term: force = dPi/dx, stiffness = dforce/dx, control and load forces; rigid motion costs nothing; parameter
+//! maps assemble like the mesh they stand for; the same bits on any number of threads.
+
+mod common;
+
+use common::{Random, assert_close, curved_block, product};
+use risorius::forward::{Drive, Settings, Solver};
+use risorius::material::MooneyRivlin;
+use risorius::material::fibre::Blemker;
+use risorius::math::tensor::{Matrix, Vector, apply};
+use risorius::mesh::Mesh;
+use risorius::mesh::block::block;
+use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
+use risorius::mesh::fibre_angles::FibreAngles;
+use risorius::mesh::location::Locator;
+use risorius::mesh::map::{ElementMap, Term as MapTerm};
+use risorius::model::supports::{Support, Supports};
+use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
+use risorius::term::load::{gravity, traction};
+use risorius::term::muscle::Muscle;
+use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
+use risorius::term::tissue::Tissue;
+use risorius::term::{Term, Want};
+
+const TISSUE: MooneyRivlin = MooneyRivlin { c1: 0.5, c2: 0.2 };
+const FIBRE: Blemker = Blemker { sigma_max: 300.0, lambda_star: 1.4, lambda_ofl: 1.0, p1: 0.005, p2: 6.6 };
+
+fn host() -> Mesh {
+    curved_block(&TricubicHermite, [2, 2, 1], 0.05, 21)
+}
+
+fn tissue(mesh: &Mesh, kappa: f64, space: &dyn PressureSpace) -> Box<dyn Term> {
+    Box::new(Tissue::new(mesh, TISSUE, kappa, space, 4).expect("sound geometry"))
+}
+
+/// A muscle of 2 x 1 x 1 curved elements, its fibres twisted, in the middle of the host.
+fn muscle(host: &Mesh, element: &'static dyn Element) -> Box<dyn Term> {
+    let mut mesh = block(element, [3.0, 4.0, 3.0], [14.0, 11.0, 4.0], [2, 1, 1]);
+    let mut random = Random::new(22);
+    mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
+    let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
+    let muscle = Muscle::new("muscle", host, &Locator::new(host), &mesh, &angles, 3, FIBRE, 0).expect("embedded");
+    Box::new(muscle)
+}
+
+/// A model of the host with the given terms alone.
+fn model(mesh: Mesh, space: &'static dyn PressureSpace, terms: Vec<Box<dyn Term>>, supports: Vec<Support>) -> Model {
+    let supports = Supports::new(&mesh, supports).expect("supports agree");
+    let controls = vec![Control { name: "muscle".into(), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 }];
+    Model::new(Ingredients { mesh, space, terms, supports, controls, shear_modulus: 1.4, volume: 4000.0 })
+        .expect("a model")
+}
+
+/// Every term by itself, in a body without supports.
+fn cases() -> Vec<(String, Model)> {
+    let mut all = Vec::new();
+    for space in PRESSURE_SPACES {
+        for kappa in [0.0, 10.0] {
+            let mesh = host();
+            let terms = vec![tissue(&mesh, kappa, space)];
+            all.push((format!("tissue, {}, kappa {kappa}", space.name()), model(mesh, space, terms, Vec::new())));
+        }
+    }
+    let mut single = |name: &str, term: &dyn Fn(&Mesh) -> Box<dyn Term>| {
+        let mesh = host();
+        let terms = vec![term(&mesh)];
+        all.push((name.to_owned(), model(mesh, &pressure::Trilinear, terms, Vec::new())));
+    };
+    single("muscle of Hermite elements", &|mesh| muscle(mesh, &TricubicHermite));
+    single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
+    single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
+    single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
+    all
+}
+
+/// A state in which det F stays well above zero: a stretch and a shear with random wiggles, random pressures.
+fn random_state(model: &Model, seed: u64) -> State {
+    let mut random = Random::new(seed);
+    let gradient: Matrix = std::array::from_fn(|_| std::array::from_fn(|_| 0.15 * random.next()));
+    let mut state = model.rest();
+    for (u, x) in state.u.iter_mut().zip(&model.mesh().parameters) {
+        let (bent, wiggle) = (apply(&gradient, *x), random.triple());
+        *u = std::array::from_fn(|i| bent[i] + 0.3 * wiggle[i]);
+    }
+    state.p.iter_mut().for_each(|p| *p = random.next());
+    state.controls[0] = 0.4;
+    state.load = 0.7;
+    state
+}
+
+fn evaluate(model: &Model, state: &State) -> Evaluation {
+    risorius::forward::evaluate(model, state)
+}
+
+fn energy(model: &Model, state: &State) -> f64 {
+    evaluate(model, state).energies.iter().sum()
+}
+
+fn moved(model: &Model, state: &State, direction: &[f64], by: f64) -> State {
+    let mut state = state.clone();
+    model.advance(&mut state, direction, by);
+    state
+}
+
+/// K v with the assembled tangent.
+fn tangent_times(model: &Model, state: &State, v: &[f64]) -> Vec<f64> {
+    let mut workspace = Workspace::default();
+    model.evaluate(state, Want::Stiffness, None, &mut workspace);
+    let mut matrix = model.matrix();
+    model.assemble(&workspace, &mut matrix);
+    let mut product = vec![0.0; v.len()];
+    matrix.multiply(v, &mut product);
+    product
+}
+
+/// Directions with displacements and pressures, displacements alone, pressures alone.
+fn directions(model: &Model, seed: u64) -> Vec<Vec<f64>> {
+    let mut random = Random::new(seed);
+    let n = model.numbering().unknowns();
+    let mut all: Vec<Vec<f64>> = (0..6).map(|_| random.vector(n)).collect();
+    for index in 0..model.numbering().pressures() {
+        let unknown = model.numbering().pressure_unknown(index);
+        all[1][unknown] = 0.0;
+        all[3][unknown] = 0.0;
+    }
+    let only_pressure = all[2].clone();
+    all[2] = vec![0.0; n];
+    for index in 0..model.numbering().pressures() {
+        let unknown = model.numbering().pressure_unknown(index);
+        all[2][unknown] = only_pressure[unknown];
+    }
+    all
+}
+
+/// Differences of fourth order: (8 (f(h) - f(-h)) - (f(2h) - f(-2h))) / 12h.
+fn slope(f: impl Fn(f64) -> Vec<f64>, h: f64) -> Vec<f64> {
+    let [a, b, c, d] = [-2.0 * h, -h, h, 2.0 * h].map(f);
+    (0..a.len()).map(|k| (8.0 * (c[k] - b[k]) - (d[k] - a[k])) / (12.0 * h)).collect()
+}
+
+#[test]
+fn forces_are_slopes_of_the_energy() {
+    for (name, model) in cases() {
+        let state = random_state(&model, 31);
+        let residual = evaluate(&model, &state).residual;
+        for v in directions(&model, 32) {
+            let power: f64 = residual.iter().zip(&v).map(|(r, v)| r * v).sum();
+            let found = slope(|h| vec![energy(&model, &moved(&model, &state, &v, h))], 1e-3)[0];
+            // a sum of forces of both signs is measured against their size
+            let size: f64 = residual.iter().zip(&v).map(|(r, v)| (r * v).powi(2)).sum::<f64>().sqrt();
+            assert!((power - found).abs() <= 1e-8 * size, "{name}: {power} instead of {found}");
+        }
+    }
+}
+
+#[test]
+fn stiffness_is_the_slope_of_the_forces() {
+    for (name, model) in cases() {
+        let state = random_state(&model, 33);
+        let is_load = model.terms().iter().all(|t| t.is_load());
+        for v in directions(&model, 34) {
+            let ours = tangent_times(&model, &state, &v);
+            let differences = slope(|h| evaluate(&model, &moved(&model, &state, &v, h)).residual, 1e-3);
+            if is_load {
+                assert!(
+                    ours.iter().chain(&differences).all(|k| k.abs() < 1e-9),
+                    "{name}: a dead load has no stiffness"
+                );
+            } else {
+                assert_close(&name, &ours, &differences, 1e-8);
+            }
+        }
+    }
+}
+
+#[test]
+fn controls_and_loads_have_their_forces() {
+    for (name, model) in cases() {
+        let state = random_state(&model, 35);
+        let residual = |state: State| evaluate(&model, &state).residual;
+        let controls = |h: f64| residual(State { controls: vec![state.controls[0] + h], ..state.clone() });
+        let loads = |h: f64| residual(State { load: state.load + h, ..state.clone() });
+        let (by_control, by_load) = (model.control_force(&state, 0), model.load_force(&state));
+        // both enter linearly
+        let (found_control, found_load) = (slope(controls, 0.1), slope(loads, 0.1));
+        if name.starts_with("muscle") {
+            assert_close(&name, &by_control, &found_control, 1e-12);
+        } else {
+            assert!(by_control.iter().chain(&found_control).all(|f| *f == 0.0), "{name}: depends on a control");
+        }
+        if model.terms()[0].is_load() {
+            assert_close(&name, &by_load, &found_load, 1e-12);
+            // the work of a dead load is minus its energy
+            let work = model.external_work(&state);
+            assert_close(&name, &[-energy(&model, &state)], &[work], 1e-13);
+        } else {
+            assert!(by_load.iter().chain(&found_load).all(|f| *f == 0.0), "{name}: depends on the load");
+        }
+    }
+}
+
+/// x -> R x + t leaves the energies of tissue and muscle alone and turns their forces.
+#[test]
+fn rigid_motion_costs_nothing() {
+    let mut random = Random::new(36);
+    for (name, model) in cases().into_iter().filter(|(_, model)| !model.terms()[0].is_load()) {
+        let state = random_state(&model, 37);
+        let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
+        let mut turned = state.clone();
+        for (parameter, x) in model.current(&state).iter().enumerate() {
+            let value = model.mesh().parameter_derivative[parameter] == 0;
+            let (rotated, start) = (apply(&turn, *x), model.mesh().parameters[parameter]);
+            turned.u[parameter] = std::array::from_fn(|i| rotated[i] + if value { shift[i] } else { 0.0 } - start[i]);
+        }
+        let (before, after) = (evaluate(&model, &state), evaluate(&model, &turned));
+        assert_close(&name, &after.energies, &before.energies, 1e-12);
+        let rotated: Vec<Vector> = before.force.iter().map(|f| apply(&turn, *f)).collect();
+        assert_close(&name, after.force.as_flattened(), rotated.as_flattened(), 1e-11);
+    }
+}
+
+/// At rest the tissue is free of force, and a rigid motion of it has no stiffness.
+#[test]
+fn rest_is_an_equilibrium() {
+    for (name, model) in cases().into_iter().filter(|(name, _)| name.starts_with("tissue")) {
+        let found = evaluate(&model, &model.rest());
+        let scale = model.force_scale();
+        assert!(found.residual.iter().all(|r| r.abs() < 1e-12 * scale), "{name}");
+        assert_close(&name, &[found.det_f.min, found.det_f.max], &[1.0, 1.0], 1e-13);
+        // the rotation du = w x X
+        let spin: Matrix = [[0.0, -0.3, 0.2], [0.3, 0.0, -0.5], [-0.2, 0.5, 0.0]];
+        let mut v = vec![0.0; model.numbering().unknowns()];
+        for (parameter, x) in model.mesh().parameters.iter().enumerate() {
+            for (i, du) in apply(&spin, *x).into_iter().enumerate() {
+                v[model.numbering().displacement_unknown(parameter, i).expect("free")] = du;
+            }
+        }
+        let force = tangent_times(&model, &model.rest(), &v);
+        assert!(common::largest(&force) < 1e-11 * scale, "{name}: {:.1e}", common::largest(&force));
+    }
+}
+
+/// A mesh whose node 1 hangs between its nodes 0 and 2: its parameters are sums over theirs, so the mesh has none
+/// for it. Also gives the expanded mesh, with a parameter for everything, and the matrix T with
+/// expanded = T x hanging, row by row.
+fn hanging() -> (Mesh, Mesh, Vec<Vec<MapTerm>>) {
+    let mut expanded = curved_block(&TricubicHermite, [2, 2, 1], 0.05, 41);
+    let global = |parameter: usize| if parameter < 8 { parameter } else { parameter - 8 } as u32;
+    let single = |parameter: usize| vec![MapTerm { global: global(parameter), scale: 1.0 }];
+    let rows: Vec<Vec<MapTerm>> = (0..expanded.parameters.len())
+        .map(|parameter| {
+            let (node, mask) = (parameter / 8, parameter % 8);
+            match (node, mask & 1) {
+                // half way on the line from node 0 to node 2: values are means, slopes along it are half differences
+                (1, 0) => [mask, 16 + mask].map(|p| MapTerm { global: global(p), scale: 0.5 }).to_vec(),
+                (1, _) => {
+                    let (start, end) = (global(mask - 1), global(16 + mask - 1));
+                    vec![MapTerm { global: start, scale: -0.5 }, MapTerm { global: end, scale: 0.5 }]
+                }
+                _ => single(parameter),
+            }
+        })
+        .collect();
+    let keep = |parameter: &usize| !(8..16).contains(parameter);
+    let kept: Vec<usize> = (0..expanded.parameters.len()).filter(keep).collect();
+    let parameters: Vec<Vector> = kept.iter().map(|p| expanded.parameters[*p]).collect();
+    expanded.parameters = expand(&rows, &parameters);
+    let locals = expanded.corners.as_flattened().iter().flat_map(|node| rows[8 * node..8 * node + 8].to_vec());
+    let hanging = Mesh {
+        map: ElementMap::new(64, locals),
+        parameters,
+        parameter_node: kept.iter().map(|p| expanded.parameter_node[*p]).collect(),
+        parameter_derivative: kept.iter().map(|p| expanded.parameter_derivative[*p]).collect(),
+        ..expanded.clone()
+    };
+    (hanging, expanded, rows)
+}
+
+/// T x global
+fn expand(rows: &[Vec<MapTerm>], global: &[Vector]) -> Vec<Vector> {
+    let row = |terms: &Vec<MapTerm>| {
+        std::array::from_fn(|i| terms.iter().map(|t| t.scale * global[t.global as usize][i]).sum())
+    };
+    rows.iter().map(row).collect()
+}
+
+/// energy and T^T force, T^T K T agree, for both pressure spaces and with supports.
+#[test]
+fn a_hanging_node_assembles_like_its_expansion() {
+    for space in PRESSURE_SPACES {
+        let (hanging, expanded, rows) = hanging();
+        let build = |mesh: Mesh| {
+            let terms = vec![tissue(&mesh, 10.0, space), muscle(&mesh, &TricubicHermite)];
+            model(mesh, space, terms, Vec::new())
+        };
+        let (small, large) = (build(hanging), build(expanded));
+        let state = random_state(&small, 42);
+        let state_of_large = |state: &State| State { u: expand(&rows, &state.u), ..state.clone() };
+        let (ours, theirs) = (evaluate(&small, &state), evaluate(&large, &state_of_large(&state)));
+        assert_close("energies", &ours.energies, &theirs.energies, 1e-12);
+        let mut gathered = vec![[0.0; 3]; small.mesh().parameters.len()];
+        for (terms, force) in rows.iter().zip(&theirs.force) {
+            for term in terms {
+                (0..3).for_each(|i| gathered[term.global as usize][i] += term.scale * force[i]);
+            }
+        }
+        assert_close("forces", ours.force.as_flattened(), gathered.as_flattened(), 1e-12);
+
+        // w . K v for random v, w
+        let pick = |model: &Model, u: &[Vector], p: &[f64]| {
+            let mut v = vec![0.0; model.numbering().unknowns()];
+            for (parameter, u) in u.iter().enumerate() {
+                for (i, u) in u.iter().enumerate() {
+                    v[model.numbering().displacement_unknown(parameter, i).expect("free")] = *u;
+                }
+            }
+            p.iter().enumerate().for_each(|(k, p)| v[model.numbering().pressure_unknown(k)] = *p);
+            v
+        };
+        let mut random = Random::new(43);
+        for _ in 0..4 {
+            let mut sample = || {
+                let u: Vec<Vector> = state.u.iter().map(|_| random.triple()).collect();
+                let p = random.vector(state.p.len());
+                (pick(&small, &u, &p), pick(&large, &expand(&rows, &u), &p))
+            };
+            let ((v, v_large), (w, w_large)) = (sample(), sample());
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let small_product = tangent_times(&small, &state, &v);
+            let large_product = tangent_times(&large, &state_of_large(&state), &v_large);
+            let size = dot(&small_product, &small_product).sqrt() * dot(&w, &w).sqrt();
+            let difference = dot(&w, &small_product) - dot(&w_large, &large_product);
+            assert!(difference.abs() < 1e-13 * size, "{}: {difference:.1e} of {size:.1e}", space.name());
+        }
+    }
+}
+
+/// What a prescribed motion leaves outstanding enters the Newton step through K: K gap over the unknowns.
+#[test]
+fn prescribed_motion_is_lifted_through_the_tangent() {
+    let mesh = host();
+    let terms = vec![tissue(&mesh, 10.0, &pressure::Trilinear), muscle(&mesh, &TricubicHermite)];
+    let clamp = Support::Clamp { faces: mesh.named_faces["xi1=0"].clone() };
+    let held = model(mesh, &pressure::Trilinear, terms, vec![clamp]);
+    let state = random_state(&held, 44);
+    let mut random = Random::new(45);
+    let mut gap = vec![[0.0; 3]; state.u.len()];
+    for (parameter, gap) in gap.iter_mut().enumerate() {
+        for (i, gap) in gap.iter_mut().enumerate() {
+            if held.supports().fixes(parameter, i) {
+                *gap = random.next();
+            }
+        }
+    }
+    let lifted = held.evaluate(&state, Want::Stiffness, Some(&gap), &mut Workspace::default()).lifted;
+    let along = |h: f64| {
+        let u = state.u.iter().zip(&gap).map(|(u, g)| std::array::from_fn(|i| u[i] + h * g[i])).collect();
+        evaluate(&held, &State { u, ..state.clone() }).residual
+    };
+    assert_close("K gap", &lifted, &slope(along, 1e-3), 1e-8);
+}
+
+/// Evaluation, tangent and a solved equilibrium have the same bits on one, two and four threads.
+#[test]
+fn threads_change_no_bit() {
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let mesh = host();
+            let terms = vec![
+                tissue(&mesh, 10.0, &pressure::Trilinear),
+                muscle(&mesh, &TricubicHermite),
+                Box::new(gravity(&mesh, 1000.0, [0.0, 0.0, -9.81], 4)),
+            ];
+            let clamp = Support::Clamp { faces: mesh.named_faces["xi1=0"].clone() };
+            let model = model(mesh, &pressure::Trilinear, terms, vec![clamp]);
+            let state = random_state(&model, 46);
+            let mut workspace = Workspace::default();
+            let found = model.evaluate(&state, Want::Stiffness, None, &mut workspace);
+            let mut matrix = model.matrix();
+            model.assemble(&workspace, &mut matrix);
+            let drive = Drive { controls: vec![0.02], load: 1.0 };
+            let mut solver = Solver::new(&model, Settings::default()).expect("memory");
+            let solved = solver.equilibrium(&model.rest(), &drive).unwrap_or_else(|f| panic!("{}", f.error));
+            let mut numbers = found.energies;
+            numbers.extend(found.residual);
+            numbers.extend(found.force.as_flattened());
+            numbers.extend(&matrix.values);
+            numbers.extend(solved.state.u.as_flattened());
+            numbers.extend(solved.state.p);
+            numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+        })
+    };
+    let one = run(1);
+    assert!(one == run(2), "two threads");
+    assert!(one == run(4), "four threads");
+}
+
+/// The rotations used here are rotations.
+#[test]
+fn random_rotations_are_orthogonal() {
+    let mut random = Random::new(47);
+    for _ in 0..20 {
+        let turn = random.rotation();
+        let unit = product(&turn, &common::transposed(&turn));
+        assert_close("R R^T", unit.as_flattened(), risorius::math::tensor::IDENTITY.as_flattened(), 1e-15);
+    }
+}
