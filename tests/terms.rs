@@ -39,7 +39,7 @@ fn muscle(host: &Mesh, element: &'static dyn Element) -> Box<dyn Term> {
     let mut random = Random::new(22);
     mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
     let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
-    let muscle = Muscle::new("muscle", host, &Locator::new(host), &mesh, &angles, 3, FIBRE, 0).expect("embedded");
+    let muscle = Muscle::new("muscle", &Locator::new(host), &mesh, &angles, 3, FIBRE, 0).expect("embedded");
     Box::new(muscle)
 }
 

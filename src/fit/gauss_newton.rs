@@ -33,7 +33,7 @@ impl Range {
         ((q - self.lower) / self.onset).ln_1p()
     }
 
-    fn from_even(self, t: f64) -> f64 {
+    fn at_even(self, t: f64) -> f64 {
         (self.lower + self.onset * t.exp_m1()).clamp(self.lower, self.upper)
     }
 }
@@ -114,7 +114,7 @@ where
             let upper: Vec<f64> =
                 t.iter().zip(&self.ranges).map(|(t, r)| (r.to_even(r.upper) - t).max(0.0).min(self.trust)).collect();
             let d = bounded_step(&h, g.as_slice(), &lower, &upper)?;
-            let trial: Vec<f64> = (0..n).map(|k| self.ranges[k].from_even(t[k] + d[k])).collect();
+            let trial: Vec<f64> = (0..n).map(|k| self.ranges[k].at_even(t[k] + d[k])).collect();
             self.step = trial.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             let d = DVector::from_vec(d);
             let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));

@@ -46,6 +46,11 @@ impl<'m> Locator<'m> {
         Locator { mesh, tree: RTree::bulk_load(boxes), locals, scale }
     }
 
+    /// The mesh whose points are found.
+    pub fn mesh(&self) -> &'m Mesh {
+        self.mesh
+    }
+
     /// The material point at reference position `x` (mm). On a shared face the lowest element index wins.
     ///
     /// Errors: [`Outside`] with the nearest point when no element holds it.

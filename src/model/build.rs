@@ -64,7 +64,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
     for (index, spec) in scene.muscles.iter().enumerate() {
-        match embed(spec, &mesh, &locator, index) {
+        match embed(spec, &locator, index) {
             Ok(muscle) => {
                 warnings.extend(coarse_rule(spec, &scene.mesh.block));
                 terms.push(Box::new(muscle));
@@ -122,7 +122,7 @@ fn faces<'m>(mesh: &'m Mesh, spec: &FaceSpec) -> &'m [Face] {
     mesh.named_faces.get(&spec.to_string()).map_or(&[], Vec::as_slice)
 }
 
-fn embed(spec: &MuscleSpec, host: &Mesh, locator: &Locator<'_>, control: usize) -> Result<Muscle> {
+fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Muscle> {
     let ElementSpec::Trilinear = spec.element;
     let mesh = block(&Trilinear, spec.block.origin_mm, spec.block.size_mm, spec.block.elements);
     let angles = match &spec.fibres {
@@ -139,7 +139,7 @@ fn embed(spec: &MuscleSpec, host: &Mesh, locator: &Locator<'_>, control: usize) 
         p1: b.p1,
         p2: b.p2,
     };
-    Muscle::new(&spec.name, host, locator, &mesh, &angles, spec.gauss, law, control).map_err(|error| match error {
+    Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, control).map_err(|error| match error {
         NotEmbedded::Outside { count, of, element, position, distance } => {
             Error::MuscleOutside(Box::new(MuscleOutside {
                 muscle: spec.name.clone(),

@@ -47,7 +47,7 @@ impl<'a> Record<'a> {
             run,
             model,
             probes,
-            output: output.clone(),
+            output: *output,
             activations: ActivationTable::create(run, controls, fitted)?,
             energies: EnergyTable::create(run, model)?,
             convergence: ConvergenceTable::create(run)?,

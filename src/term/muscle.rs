@@ -75,11 +75,10 @@ pub enum NotEmbedded {
 }
 
 impl Muscle {
-    /// Embeds `mesh` with its fibre angles in `host`; `gauss` points per direction in each of its elements. `control` is
+    /// Embeds `mesh` with its fibre angles in the host that `locator` searches; `gauss` points per direction in each of its elements. `control` is
     /// the index of its activation.
     pub fn new(
         name: &str,
-        host: &Mesh,
         locator: &Locator<'_>,
         mesh: &Mesh,
         angles: &FibreAngles,
@@ -87,6 +86,7 @@ impl Muscle {
         law: Blemker,
         control: usize,
     ) -> Result<Muscle, NotEmbedded> {
+        let host = locator.mesh();
         let rule = GaussRule::new(gauss);
         let per_element = rule.len().pow(3);
         let mut points = Vec::with_capacity(mesh.elements() * per_element);

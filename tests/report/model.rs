@@ -30,9 +30,7 @@ pub fn model(space: &'static dyn PressureSpace) -> Model {
     for (index, name) in MUSCLES.into_iter().enumerate() {
         let slab = block(&Trilinear, [4.0, 3.5, 4.0 + 4.0 * index as f64], [20.0, 7.0, 3.0], [2, 1, 1]);
         let angles = FibreAngles::uniform(&slab, [0.3 * index as f64, 0.1, 0.0]);
-        terms.push(Box::new(
-            Muscle::new(name, &mesh, &locator, &slab, &angles, 3, law, index).expect("inside the host"),
-        ));
+        terms.push(Box::new(Muscle::new(name, &locator, &slab, &angles, 3, law, index).expect("inside the host")));
     }
     drop(locator);
     terms.push(Box::new(traction(&mesh, &side("xi3=1"), [0.0, 0.0, 0.02], 3)));

@@ -2,8 +2,9 @@
 
 use crate::model::{MUSCLES, model};
 use crate::support::{FRAME, solved, some_markers};
+use risorius::fit::covariance::Bound;
 use risorius::mesh::MaterialPoint;
-use risorius::report::summary::{Bound, FitSummary, FittedFrame, ForwardSummary, MarkerErrors};
+use risorius::report::summary::{FitSummary, FittedFrame, ForwardSummary, MarkerErrors};
 use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
 

@@ -110,8 +110,7 @@ fn embedded(reference: &Reference, host: &Mesh) -> Vec<Muscle> {
         .enumerate()
         .map(|(k, m)| {
             let angles = FibreAngles { nodes: m.angles_rad.iter().map(|[a, b, c]| [*a, -b, *c]).collect() };
-            Muscle::new(&format!("m{k}"), host, &locator, &muscle_mesh(m), &angles, m.gauss, FIBRE, k)
-                .expect("inside")
+            Muscle::new(&format!("m{k}"), &locator, &muscle_mesh(m), &angles, m.gauss, FIBRE, k).expect("inside")
         })
         .collect()
 }

@@ -56,7 +56,7 @@ pub fn model(
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
     for (index, (name, muscle, angles)) in muscles.into_iter().enumerate() {
-        let muscle = Muscle::new(name, &mesh, &locator, &muscle, &angles, 3, FIBRE, index).expect("embedded");
+        let muscle = Muscle::new(name, &locator, &muscle, &angles, 3, FIBRE, index).expect("embedded");
         terms.push(Box::new(muscle));
         controls.push(Control { name: name.to_owned(), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 });
     }
