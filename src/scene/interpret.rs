@@ -263,7 +263,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
-    let finite_difference_step = table.or("finite_difference_step", 1e-3, |item| item.number(PART));
+    let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
     Some(FitSpec {
         markers: markers?,
         units: units?,

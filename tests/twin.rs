@@ -1,0 +1,216 @@
+//! The fit returns what made its markers.
+//!
+//! `reference/beam_twin.json` holds marker tracks of an independent implementation: a beam of 60 x 20 x 20 mm, 6 x 2 x 2
+//! elements, clamped at xi1 = 0, Table 2 of Wu et al. 2013, kappa 10 kPa, 4 x 4 x 4 Gauss points, trilinear pressure, with
+//! slabs of 50 x 16 x 4 mm (5 x 2 x 1 elements, 3 x 3 x 3 points) at (4.5, 2, 14.2), fibre angle 0, and at (4.5, 2, 1.8),
+//! 36 degrees; `truth[frame]` are the activations (top, bottom), `positions_mm[frame][marker]` the markers, without noise.
+
+use risorius::fit::covariance::Bound;
+use risorius::fit::sensitivity::{Sensitivity, sensitivities};
+use risorius::fit::{Estimate, Fit};
+use risorius::forward::{Drive, Settings, Solver};
+use risorius::markers::{Frame, ReadOptions, Recording, WriteOptions, read, write_json};
+use risorius::model::build::build;
+use risorius::scene::{Scene, Units};
+use std::fmt::Write;
+use std::path::Path;
+
+#[derive(serde::Deserialize)]
+struct Twin {
+    labels: Vec<String>,
+    truth: Vec<[f64; 2]>,
+    positions_mm: Vec<Vec<[f64; 3]>>,
+}
+
+/// Reference positions of the markers, in the order of the labels of the recording.
+const MARKERS: [(&str, [f64; 3]); 12] = [
+    ("B00", [20.0, 10.0, 20.0]),
+    ("B01", [20.0, 10.0, 0.0]),
+    ("B02", [20.0, 0.0, 10.0]),
+    ("B03", [20.0, 20.0, 10.0]),
+    ("B04", [40.0, 10.0, 20.0]),
+    ("B05", [40.0, 10.0, 0.0]),
+    ("B06", [40.0, 0.0, 10.0]),
+    ("B07", [40.0, 20.0, 10.0]),
+    ("B08", [60.0, 10.0, 20.0]),
+    ("B09", [60.0, 10.0, 0.0]),
+    ("B10", [60.0, 0.0, 10.0]),
+    ("B11", [60.0, 20.0, 10.0]),
+];
+
+fn twin() -> Twin {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/beam_twin.json");
+    serde_json::from_str(&std::fs::read_to_string(path).expect("the file")).expect("its numbers")
+}
+
+fn problem(extra: &str) -> String {
+    let mut text = String::from(
+        r#"
+[task]
+kind = "fit"
+[mesh]
+block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
+[tissue]
+mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
+kappa_kpa = 10.0
+gauss = 4
+[[muscle]]
+name = "top"
+block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
+fibre_angles_deg = [0, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[muscle]]
+name = "bottom"
+block = { origin_mm = [4.5, 2.0, 1.8], size_mm = [50, 16, 4], elements = [5, 2, 1] }
+fibre_angles_deg = [36, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[support]]
+clamp = { face = "xi1=0" }
+"#,
+    );
+    for (name, [x, y, z]) in MARKERS {
+        writeln!(text, "[[marker]]\nname = \"{name}\"\nposition_mm = [{x}, {y}, {z}]").expect("text");
+    }
+    text + "[fit]\nmarkers = \"beam.mcap\"\nunits = \"m\"\n" + extra
+}
+
+/// Fits the chosen frames of a recording, through a file, as a user would.
+fn fit(labels: &[String], frames: &[Frame], chosen: &[usize], extra: &str) -> Vec<Estimate> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("beam.mcap");
+    write_json(&path, labels, frames, &WriteOptions { units: Units::M, ..WriteOptions::default() }).expect("written");
+    let recording: Recording = read(&path, &ReadOptions { units: Units::M, ..ReadOptions::default() }).expect("read");
+    let scene = Scene::parse(&problem(extra), "twin.toml", Path::new("."), &[]).expect("a scene");
+    let built = build(&scene).expect("a model");
+    let spec = scene.fit.as_ref().expect("a fit");
+    let mut fit = Fit::new(&built.model, &scene, spec, &recording).expect("a fit");
+    chosen.iter().map(|k| fit.frame(&recording, *k).unwrap_or_else(|error| panic!("frame {k}: {error}"))).collect()
+}
+
+fn frames(positions: &[Vec<[f64; 3]>]) -> Vec<Frame> {
+    let frame = |(k, positions): (usize, &Vec<[f64; 3]>)| Frame {
+        time_s: k as f64 / 30.0,
+        stamp_ns: 1_000_000_000 + k as i64 * 33_333_333,
+        positions_mm: positions.iter().map(|p| Some(*p)).collect(),
+    };
+    positions.iter().enumerate().map(frame).collect()
+}
+
+#[test]
+fn truth_within_1e_6_in_every_frame() {
+    let twin = twin();
+    let all: Vec<usize> = (0..twin.truth.len()).collect();
+    for (estimate, truth) in fit(&twin.labels, &frames(&twin.positions_mm), &all, "").iter().zip(&twin.truth) {
+        for (found, truth) in estimate.equilibrium.state.controls.iter().zip(truth) {
+            assert!((found - truth).abs() < 1e-6, "frame {}: {found} instead of {truth}", estimate.frame);
+        }
+        assert!(estimate.rms_mm < 1e-4, "frame {}: rms {} mm", estimate.frame, estimate.rms_mm);
+    }
+}
+
+#[test]
+fn finite_differences_give_the_same_answer() {
+    let twin = twin();
+    let chosen = [4, 12, 20, 28];
+    let frames = frames(&twin.positions_mm);
+    let tangent = fit(&twin.labels, &frames, &chosen, "");
+    let difference = fit(&twin.labels, &frames, &chosen, "sensitivity = \"finite-difference\"\n");
+    for (a, b) in tangent.iter().zip(&difference) {
+        for (a, b) in a.equilibrium.state.controls.iter().zip(&b.equilibrium.state.controls) {
+            assert!((a - b).abs() < 1e-5 * a.abs().max(0.01), "{a} and {b}");
+        }
+    }
+}
+
+/// dx/dq by the implicit function theorem and by central differences of whole equilibria, in the interior and at rest,
+/// where the difference is one-sided. The step is small because the passive force of a slack fibre has a kink at stretch 1.
+#[test]
+fn sensitivities_agree() {
+    let scene = Scene::parse(&problem(""), "twin.toml", Path::new("."), &[]).expect("a scene");
+    let built = build(&scene).expect("a model");
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    for controls in [[0.03, 0.07], [0.002, 0.0]] {
+        let mut solver = Solver::new(&built.model, settings).expect("memory");
+        let drive = Drive { controls: controls.to_vec(), load: 1.0 };
+        let at = solver.equilibrium(&built.model.rest(), &drive).expect("an equilibrium");
+        let tangent = sensitivities(Sensitivity::Tangent, &mut solver, &at, &[0, 1]).expect("a tangent");
+        let how = Sensitivity::FiniteDifference { step: 1e-4 };
+        let difference = sensitivities(how, &mut solver, &at, &[0, 1]).expect("differences");
+        for (control, (a, b)) in tangent.iter().zip(&difference).enumerate() {
+            let scale = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(worst < 1e-6 * scale, "control {control} at {controls:?}: {:.1e}", worst / scale);
+        }
+    }
+}
+
+/// Markers that are lost drop out of the sum: their places are not guessed, and the truth is still found.
+#[test]
+fn missing_markers_drop_out() {
+    let twin = twin();
+    let mut frames = frames(&twin.positions_mm);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        for (m, position) in frame.positions_mm.iter_mut().enumerate() {
+            if (m + k) % 3 != 0 {
+                *position = None;
+            }
+        }
+    }
+    for (estimate, k) in fit(&twin.labels, &frames, &[10, 17, 24], "").iter().zip([10, 17, 24]) {
+        assert_eq!(estimate.measured_mm.iter().flatten().count(), 4);
+        for (found, truth) in estimate.equilibrium.state.controls.iter().zip(twin.truth[k]) {
+            assert!((found - truth).abs() < 1e-6, "frame {k}: {found} instead of {truth}");
+        }
+    }
+}
+
+/// With Gaussian noise of known size the standardised errors of the activations have unit variance: the covariance from
+/// J^T J is right. Sixty noisy copies of one frame, two activations each: the mean square lies within 1 +- 0.45 (3.5 standard
+/// deviations of a chi-square with 120 degrees of freedom).
+#[test]
+fn deviations_match_the_scatter_of_noisy_fits() {
+    let twin = twin();
+    let (frame, copies, noise) = (18, 60, 0.1);
+    let mut seed = 2026_u64;
+    let mut uniform = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((seed >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+    };
+    let noisy: Vec<Vec<[f64; 3]>> = (0..copies)
+        .map(|_| {
+            let jitter = |x: f64| {
+                let normal = (-2.0 * uniform().ln()).sqrt() * (2.0 * std::f64::consts::PI * uniform()).cos();
+                x + noise * normal
+            };
+            let mut jitter = jitter;
+            twin.positions_mm[frame].iter().map(|p| p.map(&mut jitter)).collect()
+        })
+        .collect();
+    let all: Vec<usize> = (0..copies).collect();
+    let estimates = fit(&twin.labels, &frames(&noisy), &all, &format!("sd_mm = {noise}\n"));
+    let mut squares = 0.0;
+    for estimate in &estimates {
+        for (control, truth) in twin.truth[frame].iter().enumerate() {
+            assert_eq!(estimate.bounds[control], Bound::Free);
+            let sd = estimate.sd[control].expect("determined");
+            squares += ((estimate.equilibrium.state.controls[control] - truth) / sd).powi(2);
+        }
+    }
+    let mean = squares / (2 * copies) as f64;
+    assert!((mean - 1.0).abs() < 0.45, "mean square of standardised errors: {mean}");
+}
+
+/// A control on its bound has no standard deviation, and says on which bound it lies.
+#[test]
+fn bounds_hold_and_are_told() {
+    let twin = twin();
+    // moved against what the muscles can do: the beam bends down where only the top muscle is left to explain it
+    let mut positions = vec![twin.positions_mm[0].clone()];
+    for p in &mut positions[0] {
+        p[2] -= 0.002 * p[0] * p[0];
+    }
+    let estimate = &fit(&twin.labels, &frames(&positions), &[0], "unknowns = [\"top\"]\n")[0];
+    assert_eq!(estimate.equilibrium.state.controls, vec![0.0, 0.0]);
+    assert_eq!(estimate.bounds[0], Bound::Lower);
+    assert_eq!(estimate.sd, vec![None, None]);
+}
