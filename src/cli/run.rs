@@ -1,13 +1,13 @@
 //! `risorius run [problem.toml]`: does what the problem's task says, and leaves a run folder.
 
 use super::check::describe;
-use super::problem::{Source, chosen_frames, recording_warnings};
+use super::prepare::{Clip, Prepared, prepare};
+use super::problem::Source;
 use super::{Ending, Flags, fit, forward};
 use crate::error::{Error, Result};
 use crate::forward::Work;
-use crate::markers::Recording;
 use crate::model::Model;
-use crate::model::build::{Built, build};
+use crate::model::build::Built;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, Task};
@@ -54,19 +54,8 @@ impl Run {
 pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     let start = Instant::now();
     let mut source = Source::read(path, flags)?;
-    let built = build(&source.scene)?;
-    let mut warnings = source.scene.warnings.clone();
-    warnings.extend(built.warnings.iter().cloned());
     // the recording is read before anything is written: a mistake in it leaves no folder behind
-    let clip = match (source.scene.task, &source.scene.fit) {
-        (Task::Fit, Some(fit)) => {
-            let recording = source.recording(fit)?;
-            warnings.extend(recording_warnings(&recording));
-            let frames = chosen_frames(fit, &recording)?;
-            Some((recording, frames))
-        }
-        _ => None,
-    };
+    let Prepared { built, clip, warnings } = prepare(&source)?;
     flags.warn(&warnings);
     if flags.strict && !warnings.is_empty() {
         return Ok(Ending::Warned);
@@ -92,22 +81,20 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     run.write_running(&Tally::default())?;
 
     let mut work = Work::default();
-    let outcome = task(&source, &built, clip, &run, flags, &mut work);
+    let outcome = task(&source, &built, clip.as_ref(), &run, flags, &mut work);
     finish(&run, &built.model, &work, outcome)
 }
 
 fn task(
     source: &Source,
     built: &Built,
-    clip: Option<(Recording, Vec<usize>)>,
+    clip: Option<&Clip>,
     run: &Run,
     flags: &Flags,
     work: &mut Work,
 ) -> Result<Tally> {
     match (clip, &source.scene.fit) {
-        (Some((recording, frames)), Some(spec)) => {
-            fit::fit(&source.scene, spec, built, &recording, &frames, run, flags, work)
-        }
+        (Some(clip), Some(spec)) => fit::fit(&source.scene, spec, built, clip, run, flags, work),
         _ => forward::forward(&source.scene, built, run, flags, work),
     }
 }

@@ -372,14 +372,14 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
-    /// The recording has none of the frames that a fit asks for.
-    #[error("the recording has {count} frames, numbered from 0: none is left from frame {first} on")]
-    NoSuchFrames {
-        /// First frame asked for.
-        first: usize,
+    /// The recording does not have the first or the last frame that a fit asks for.
+    #[error("the recording has {count} frames, 0 to {}: there is no frame {frame}", count.saturating_sub(1))]
+    NoSuchFrame {
+        /// Frame asked for, from 0.
+        frame: usize,
         /// Frames of the recording.
         count: usize,
-        /// The fit in the problem file.
+        /// The frames in the problem file.
         place: Box<Place>,
     },
     /// A marker lies far from the surface of the host.
@@ -586,6 +586,14 @@ impl Error {
         }
     }
 
+    /// [`Error::mistakes`] by value.
+    pub fn into_mistakes(self) -> Vec<Error> {
+        match self {
+            Error::Mistakes(mistakes) => mistakes,
+            single => vec![single],
+        }
+    }
+
     /// The stable code, for example `S003`.
     pub fn code(&self) -> &'static str {
         match self {
@@ -620,7 +628,7 @@ impl Error {
             Error::UnitsLookWrong { .. } => "K001",
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
-            Error::NoSuchFrames { .. } => "K004",
+            Error::NoSuchFrame { .. } => "K004",
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -666,10 +674,10 @@ impl Error {
                 "copy the file again from where it was recorded, or save its good chunks with `mcap recover`".into(),
             ),
             Error::TruncatedRecording { .. } => {
-                Some("copy the file again, or set `allow_truncated` to use the intact part".into())
+                Some("copy the file again, or add allow_truncated = true to [fit] to use the intact part".into())
             }
             Error::UncheckedRecording { .. } => {
-                Some("rewrite it with checksums (`mcap recover IN -o OUT`), or set `allow_unchecked`".into())
+                Some("rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into())
             }
             Error::NoMarkerTopic { .. } => Some(
                 "record `mocap4r2_msgs/msg/Markers` (CDR), or JSON with a JSON schema that has `markers[]`".into(),
@@ -677,7 +685,7 @@ impl Error {
             Error::SeveralMarkerTopics { topics, .. } => topics
                 .iter()
                 .find(|topic| topic.is_readable())
-                .map(|topic| format!("name one of them: topic = \"{}\"", topic.name)),
+                .map(|topic| format!("name one of them in [fit]: topic = \"{}\"", topic.name)),
             Error::TopicNotFound { nearest, .. } => {
                 nearest.as_ref().map(|topic| format!("did you mean topic = \"{topic}\"?"))
             }
@@ -687,7 +695,7 @@ impl Error {
                 .map(|topic| format!("this one can be read: topic = \"{}\"", topic.name)),
             Error::EmptyTopic { .. } => Some("record again: was the driver running?".into()),
             Error::NoSamples { missing, .. } => (missing.zero > 0)
-                .then(|| "all markers lie at (0, 0, 0): if they really do, set `zero_is_missing = false`".into()),
+                .then(|| "all markers lie at (0, 0, 0): if they really do, add zero_is_missing = false to [fit]".into()),
             Error::Undecodable { .. } => Some(
                 "the recorder stored another schema than the driver used: record again with matching messages".into(),
             ),
@@ -702,7 +710,10 @@ impl Error {
                 "its nearest point on the surface is position_mm = [{:.3}, {:.3}, {:.3}]; or raise fit.max_marker_distance_mm",
                 foot[0], foot[1], foot[2]
             )),
-            Error::NoSuchFrames { .. } => Some("choose other frames: frames = { first = 0 }".into()),
+            Error::NoSuchFrame { count, .. } => Some(format!(
+                "the whole recording is frames = {{ first = 0, last = {} }}; without `last` it goes on to its end",
+                count.saturating_sub(1)
+            )),
             Error::InvertedMesh { .. } => Some("check sizes and the order of nodes: sizes must be positive".into()),
             Error::MuscleOutside(_) => Some("move or shrink the muscle until it lies inside the host".into()),
             Error::InvertedMuscle { .. } => Some("check the muscle's size and the order of its nodes".into()),
@@ -768,7 +779,7 @@ impl Error {
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
-            | Error::NoSuchFrames { place, .. } => Some(place),
+            | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
             _ => None,
         }

@@ -99,7 +99,7 @@ pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: 
         labels: pairs.len(),
         declared: fit.units.name(),
         likely: likely.unwrap_or(fit.units).name(),
-        place: Box::new(fit.place.clone()),
+        place: Box::new(fit.units_place.clone()),
     })
 }
 

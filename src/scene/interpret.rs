@@ -252,15 +252,19 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
     let units = Units::ALL.map(|units| (units.name(), units));
     let units = table.required("units", "units = \"m\"", |item| item.choice(&units, &[]));
+    let units_place = table.place_of("units");
     let topic = table.optional("topic", |item| item.name());
     let sensitivities =
         [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
     let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
     let unknowns = table.or("unknowns", references.muscles(), |item| references.unknowns(&item));
     let zero_is_missing = table.or("zero_is_missing", true, |item| item.flag());
+    let allow_truncated = table.or("allow_truncated", false, |item| item.flag());
+    let allow_unchecked = table.or("allow_unchecked", false, |item| item.flag());
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
+    let frames_place = table.place_of("frames");
     let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
     let finite_difference_step = table.or("finite_difference_step", 1e-3, |item| item.number(PART));
@@ -271,6 +275,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         sensitivity: sensitivity?,
         unknowns: unknowns?,
         zero_is_missing: zero_is_missing?,
+        allow_truncated: allow_truncated?,
+        allow_unchecked: allow_unchecked?,
         sd_mm: sd_mm?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
@@ -278,6 +284,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         max_iterations: max_iterations?,
         finite_difference_step: finite_difference_step?,
         place: table.place(),
+        units_place,
+        frames_place,
     })
 }
 
