@@ -39,8 +39,8 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
         text += &format!("  {:<20} {points:>8}\n", term.name());
     }
     text += &format!(
-        "one Newton iteration: factorisation of {:.2} Gflop, {:.1} MB of factor\n",
-        model.factor_flops() / 1e9,
+        "one Newton iteration: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
+        model.factor_flops() / 1e6,
         8e-6 * model.symbolic().factor_nnz() as f64
     );
     text

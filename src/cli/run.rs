@@ -30,6 +30,8 @@ pub(super) struct Tally {
     pub frames_ok: usize,
     pub failed: Vec<FailedFrame>,
     pub interrupted: bool,
+    /// A warning came up on the way.
+    pub warned: bool,
 }
 
 impl Run {
@@ -82,7 +84,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
 
     let mut work = Work::default();
     let outcome = task(&source, &built, clip.as_ref(), &run, flags, &mut work);
-    finish(&run, &built.model, &work, outcome)
+    finish(&run, &built.model, &work, outcome, flags.strict)
 }
 
 fn task(
@@ -100,18 +102,33 @@ fn task(
 }
 
 /// Writes status and manifest whatever happened, and says how the command ends.
-fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>) -> Result<Ending> {
+fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>, strict: bool) -> Result<Ending> {
     run.manifest(model, work)?;
     match outcome {
         Ok(tally) => {
-            let Tally { frames_ok, failed, interrupted } = tally;
-            let converged = failed.is_empty();
-            if interrupted {
-                Status::interrupted(frames_ok, failed).write(&run.folder)?;
-                return Ok(Ending::Interrupted);
+            let Tally { frames_ok, failed, interrupted, warned } = tally;
+            let ending = match failed.len() {
+                _ if interrupted => Ending::Interrupted,
+                0 if warned && strict => Ending::Warned,
+                0 => Ending::Ok,
+                _ => Ending::NotConverged,
+            };
+            let folder = run.folder.path().display();
+            match ending {
+                Ending::Interrupted => eprintln!("interrupted: {frames_ok} frames are finished and kept in {folder}"),
+                Ending::NotConverged => eprintln!(
+                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json)",
+                    failed.len(),
+                    frames_ok + failed.len()
+                ),
+                Ending::Ok | Ending::Warned => {}
             }
-            Status::finished(frames_ok, failed).write(&run.folder)?;
-            Ok(if converged { Ending::Ok } else { Ending::NotConverged })
+            let status = match interrupted {
+                true => Status::interrupted(frames_ok, failed),
+                false => Status::finished(frames_ok, failed),
+            };
+            Status { exit: Some(ending.exit_code()), ..status }.write(&run.folder)?;
+            Ok(ending)
         }
         Err(error) => {
             Status::failed(0, Vec::new(), &error).write(&run.folder)?;

@@ -481,8 +481,8 @@ pub enum Error {
     NotFactored,
     /// Newton's method found no equilibrium on the way to the asked load and controls.
     #[error(
-        "no equilibrium beyond {:.4} of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN",
-        reached
+        "no equilibrium beyond {:.2} % of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN",
+        100.0 * reached
     )]
     NotConverged {
         /// Part of the way, 0 to 1, at which the last equilibrium was found.
@@ -676,9 +676,9 @@ impl Error {
             Error::TruncatedRecording { .. } => {
                 Some("copy the file again, or add allow_truncated = true to [fit] to use the intact part".into())
             }
-            Error::UncheckedRecording { .. } => {
-                Some("rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into())
-            }
+            Error::UncheckedRecording { .. } => Some(
+                "rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into(),
+            ),
             Error::NoMarkerTopic { .. } => Some(
                 "record `mocap4r2_msgs/msg/Markers` (CDR), or JSON with a JSON schema that has `markers[]`".into(),
             ),
@@ -694,8 +694,9 @@ impl Error {
                 .find(|topic| topic.is_readable())
                 .map(|topic| format!("this one can be read: topic = \"{}\"", topic.name)),
             Error::EmptyTopic { .. } => Some("record again: was the driver running?".into()),
-            Error::NoSamples { missing, .. } => (missing.zero > 0)
-                .then(|| "all markers lie at (0, 0, 0): if they really do, add zero_is_missing = false to [fit]".into()),
+            Error::NoSamples { missing, .. } => (missing.zero > 0).then(|| {
+                "all markers lie at (0, 0, 0): if they really do, add zero_is_missing = false to [fit]".into()
+            }),
             Error::Undecodable { .. } => Some(
                 "the recorder stored another schema than the driver used: record again with matching messages".into(),
             ),
