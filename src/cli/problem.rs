@@ -41,7 +41,12 @@ impl Source {
             allow_truncated: fit.allow_truncated,
             allow_unchecked: fit.allow_unchecked,
         };
-        if self.embeds(fit) { read_bytes(&fit.markers, RECORDING, &options) } else { read(&fit.markers, &options) }
+        let recording = if self.embeds(fit) {
+            read_bytes(&fit.markers, RECORDING, &options)
+        } else {
+            read(&fit.markers, &options)
+        };
+        recording.map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
     }
 
     /// The recording as bytes, if it is the built-in one: a run keeps a copy, so that its lock file can be run again.

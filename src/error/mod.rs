@@ -183,6 +183,9 @@ pub enum Error {
         /// The time of this row.
         place: Place,
     },
+    /// An error of a file that the problem names, with the line that names it; its code, help and exit code are its own.
+    #[error("{}", .0.0)]
+    Named(Box<(Error, Place)>),
     // ---- M: recording ---------------------------------------------------------------------------------
     /// The file is something else.
     #[error("{} is not an MCAP file: its {bytes} bytes start with `{}`", path.display(), start.escape_ascii())]
@@ -598,6 +601,7 @@ impl Error {
     pub fn code(&self) -> &'static str {
         match self {
             Error::Mistakes(_) => "C000",
+            Error::Named(named) => named.0.code(),
             Error::Syntax { .. } => "C001",
             Error::UnknownKey { .. } => "C002",
             Error::MissingKey { .. } => "C003",
@@ -653,6 +657,7 @@ impl Error {
     /// The edit or command that mends it, where one is known.
     pub fn help(&self) -> Option<String> {
         match self {
+            Error::Named(named) => named.0.help(),
             Error::Mistakes(_) | Error::OutOfRange { .. } | Error::WrongLength { .. } => None,
             Error::Syntax { message, .. } => syntax_help(message),
             Error::UnknownKey { help, .. }
@@ -782,6 +787,7 @@ impl Error {
             | Error::MarkerFarFromSurface { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
+            Error::Named(named) => Some(&named.1),
             _ => None,
         }
     }

@@ -196,6 +196,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         max_iterations,
         finite_difference_step,
         place: _,
+        markers_place: _,
         units_place: _,
         frames_place: _,
     } = fit;

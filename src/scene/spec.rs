@@ -310,6 +310,9 @@ pub struct FitSpec {
     /// The table in the file.
     #[serde(skip)]
     pub place: Place,
+    /// The name of the recording.
+    #[serde(skip)]
+    pub markers_place: Place,
     /// Its unit of length.
     #[serde(skip)]
     pub units_place: Place,
