@@ -32,7 +32,8 @@ fn main() -> std::io::Result<()> {
     let no_checksums = container("none").calculate_chunk_crcs(false).calculate_data_section_crc(false);
     let text = ("std_msgs/msg/String", "ros2msg", "string data\n".to_owned());
     let hello = Message { log_time: START_NS, publish_time: START_NS, payload: b"\0\x01\0\0\x03\0\0\0hi\0".to_vec() };
-    let chatter = Topic { name: "/chatter", schema: text, encoding: "cdr", unit: None, messages: vec![hello.clone()] };
+    let chatter =
+        Topic { name: "/chatter", schema: text, encoding: "cdr", unit: None, messages: vec![hello.clone()] };
     let mut foreign = markers(|_, position| position);
     foreign.messages[1].payload = hello.payload;
 

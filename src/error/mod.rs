@@ -699,9 +699,10 @@ impl Error {
                 .find(|topic| topic.is_readable())
                 .map(|topic| format!("this one can be read: topic = \"{}\"", topic.name)),
             Error::EmptyTopic { .. } => Some("record again: was the driver running?".into()),
-            Error::NoSamples { missing, .. } => (missing.zero > 0).then(|| {
-                "all markers lie at (0, 0, 0): if they really do, add zero_is_missing = false to [fit]".into()
-            }),
+            Error::NoSamples { missing, .. } if missing.zero > 0 => {
+                Some("if markers really lie at (0, 0, 0), add zero_is_missing = false to [fit]".into())
+            }
+            Error::NoSamples { .. } => Some("record again: did the cameras see the markers?".into()),
             Error::Undecodable { .. } => Some(
                 "the recorder stored another schema than the driver used: record again with matching messages".into(),
             ),
@@ -848,6 +849,8 @@ fn wrong_type_help(key: &str, expected: &str, found: &str) -> Option<String> {
     let quoted_number = quoted.is_some_and(|text| text.trim().parse::<f64>().is_ok());
     if expected.ends_with("number") && quoted_number {
         Some("write the number without quotes".into())
+    } else if expected.ends_with("number") && found == "empty" {
+        Some("write a number in every cell; a muscle at rest is 0".into())
     } else if expected.starts_with("text") && !found.starts_with("text") {
         Some("write it in quotes".into())
     } else if expected == "a list of tables" && found == "a table" {
