@@ -60,6 +60,8 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     let Prepared { built, clip, warnings } = prepare(&source)?;
     flags.warn(&warnings);
     if flags.strict && !warnings.is_empty() {
+        let noun = if warnings.len() == 1 { "warning" } else { "warnings" };
+        eprintln!("error: {} {noun} under --strict, nothing was run", warnings.len());
         return Ok(Ending::Warned);
     }
     if !flags.quiet {
