@@ -401,6 +401,35 @@ fn a_fit_that_does_not_converge_says_so_frame_by_frame() {
 
 #[cfg(unix)]
 #[test]
+fn a_reader_that_goes_away_does_no_harm() {
+    use std::process::{Command, Stdio};
+    let folder = folder();
+    for arguments in [&["check"][..], &["run", "cantilever.toml", "--out", "run"]] {
+        let mut child = Command::new(assert_cmd::cargo::cargo_bin("risorius"))
+            .current_dir(&folder)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop((child.stdout.take(), child.stderr.take()));
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{arguments:?}");
+    }
+    assert_eq!(json(&folder, "run/status.json")["status"], "converged");
+}
+
+#[test]
+fn the_built_in_problem_can_take_another_recording() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("data")).unwrap();
+    // a file of the same name as the built-in one is not the built-in one
+    fs::write(folder.path().join("data/beam.mcap"), "").unwrap();
+    let message = stderr(&folder, &["check", "--set", "fit.markers=data/beam.mcap"], 3);
+    assert!(message.contains("error[M001]") && message.contains("it is empty"), "{message}");
+}
+
+#[cfg(unix)]
+#[test]
 fn ctrl_c_keeps_every_finished_frame() {
     use std::io::{BufRead, BufReader, Read};
     use std::process::{Command, Stdio};

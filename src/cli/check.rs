@@ -2,6 +2,7 @@
 
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
+use super::terminal::print;
 use super::{Ending, Flags};
 use crate::error::{Missing, Result};
 use crate::model::Model;
@@ -11,12 +12,11 @@ use std::path::Path;
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     let source = Source::read(path, flags)?;
     let Prepared { built, clip, warnings } = prepare(&source)?;
-    print!("{}", describe(&source.scene, &built.model));
-    if let Some(clip) = &clip {
-        print!("{}", describe_clip(clip));
-    }
+    let mut page = describe(&source.scene, &built.model);
+    page += &clip.as_ref().map(describe_clip).unwrap_or_default();
+    page += if warnings.is_empty() { "ok: no mistakes\n" } else { "ok: no mistakes, but see the warnings\n" };
     flags.warn(&warnings);
-    println!("ok: {}", if warnings.is_empty() { "no mistakes" } else { "no mistakes, but see the warnings" });
+    print(&page)?;
     Ok(if flags.strict && !warnings.is_empty() { Ending::Warned } else { Ending::Ok })
 }
 

@@ -5,6 +5,7 @@ use super::forward::probes;
 use super::prepare::Clip;
 use super::progress::Meter;
 use super::run::{Run, Tally};
+use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
 use crate::fit::{Estimate, Fit};
@@ -84,7 +85,7 @@ pub(super) fn fit(
     };
     let page = summary.to_string();
     run.folder.write("summary.txt", &page)?;
-    print!("{page}");
+    print(&page)?;
     Ok(tally)
 }
 

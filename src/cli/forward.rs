@@ -3,6 +3,7 @@
 use super::Flags;
 use super::progress::Meter;
 use super::run::{Run, Tally};
+use super::terminal::print;
 use crate::cli::diagnostics::{render_error, render_warning};
 use crate::error::{Result, Warning};
 use crate::fit::sequence::settings;
@@ -83,7 +84,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
         };
         let page = summary.to_string();
         run.folder.write("summary.txt", &page)?;
-        print!("{page}");
+        print(&page)?;
     }
     Ok(tally)
 }

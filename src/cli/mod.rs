@@ -12,6 +12,7 @@ mod prepare;
 mod problem;
 mod progress;
 mod run;
+mod terminal;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -122,7 +123,7 @@ impl Flags {
     fn warn(&self, warnings: &[Warning]) {
         if self.shows_warnings() {
             for warning in warnings {
-                eprint!("{}", render_warning(warning, self.colour()));
+                terminal::tell(&render_warning(warning, self.colour()));
             }
         }
     }
@@ -155,7 +156,7 @@ pub fn main() -> ExitCode {
     match in_threads(cli) {
         Ok(ending) => ExitCode::from(ending.exit_code()),
         Err(error) => {
-            eprint!("{}", render_error(&error, colour));
+            terminal::tell(&render_error(&error, colour));
             ExitCode::from(error.exit_code())
         }
     }

@@ -10,8 +10,9 @@ use std::path::Path;
 const PROBLEM: &str = include_str!("../../problems/beam/problem.toml");
 /// Its recording.
 const RECORDING: &[u8] = include_bytes!("../../data/beam.mcap");
-/// What messages about it call the file.
+/// What messages about them call the files.
 const NAME: &str = "beam/problem.toml (built in)";
+const RECORDING_NAME: &str = "beam.mcap (built in)";
 
 /// A scene and how to read its recording.
 pub(super) struct Source {
@@ -25,7 +26,7 @@ impl Source {
         match path {
             Some(path) => Ok(Source { scene: Scene::read(path, &flags.set)?, built_in: false }),
             None => {
-                let mut scene = Scene::parse(PROBLEM, NAME, Path::new("problems/beam"), &flags.set)?;
+                let mut scene = Scene::parse(PROBLEM, NAME, Path::new(""), &flags.set)?;
                 "beam".clone_into(&mut scene.name);
                 Ok(Source { scene, built_in: true })
             }
@@ -42,7 +43,7 @@ impl Source {
             allow_unchecked: fit.allow_unchecked,
         };
         let recording = if self.embeds(fit) {
-            read_bytes(&fit.markers, RECORDING, &options)
+            read_bytes(Path::new(RECORDING_NAME), RECORDING, &options)
         } else {
             read(&fit.markers, &options)
         };
@@ -56,7 +57,7 @@ impl Source {
 
     /// The built-in problem uses the built-in recording unless `--set fit.markers` names another.
     fn embeds(&self, fit: &FitSpec) -> bool {
-        self.built_in && fit.markers.ends_with("data/beam.mcap")
+        self.built_in && &*fit.markers_place.file == NAME
     }
 }
 

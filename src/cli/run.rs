@@ -3,6 +3,7 @@
 use super::check::describe;
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
+use super::terminal::tell;
 use super::{Ending, Flags, fit, forward};
 use crate::error::{Error, Result};
 use crate::forward::Work;
@@ -61,11 +62,11 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     flags.warn(&warnings);
     if flags.strict && !warnings.is_empty() {
         let noun = if warnings.len() == 1 { "warning" } else { "warnings" };
-        eprintln!("error: {} {noun} under --strict, nothing was run", warnings.len());
+        tell(&format!("error: {} {noun} under --strict, nothing was run\n", warnings.len()));
         return Ok(Ending::Warned);
     }
     if !flags.quiet {
-        eprint!("{}", describe(&source.scene, &built.model));
+        tell(&describe(&source.scene, &built.model));
     }
     if flags.dry_run {
         return Ok(Ending::Ok);
@@ -117,12 +118,14 @@ fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>, strict:
             };
             let folder = run.folder.path().display();
             match ending {
-                Ending::Interrupted => eprintln!("interrupted: {frames_ok} frames are finished and kept in {folder}"),
-                Ending::NotConverged => eprintln!(
-                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json)",
+                Ending::Interrupted => {
+                    tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n"))
+                }
+                Ending::NotConverged => tell(&format!(
+                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json)\n",
                     failed.len(),
                     frames_ok + failed.len()
-                ),
+                )),
                 Ending::Ok | Ending::Warned => {}
             }
             let status = match interrupted {
@@ -171,7 +174,7 @@ fn watch_interrupt() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     if ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed)).is_err() {
-        eprintln!("note: Ctrl-C will end the run at once");
+        tell("note: Ctrl-C will end the run at once\n");
     }
     flag
 }

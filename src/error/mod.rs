@@ -188,7 +188,7 @@ pub enum Error {
     Named(Box<(Error, Place)>),
     // ---- M: recording ---------------------------------------------------------------------------------
     /// The file is something else.
-    #[error("{} is not an MCAP file: its {bytes} bytes start with `{}`", path.display(), start.escape_ascii())]
+    #[error("{} is not an MCAP file: {}", path.display(), start_of(*bytes, start))]
     NotMcap {
         /// The file.
         path: PathBuf,
@@ -820,6 +820,11 @@ pub struct MuscleOutside {
     pub distance: f64,
     /// The muscle in the problem file.
     pub place: Place,
+}
+
+/// How a file of some length starts.
+fn start_of(bytes: u64, start: &[u8]) -> String {
+    if bytes == 0 { "it is empty".into() } else { format!("its {bytes} bytes start with `{}`", start.escape_ascii()) }
 }
 
 /// A mistake as a line of a list.
