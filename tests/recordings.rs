@@ -283,7 +283,7 @@ fn the_topic_is_found_or_named() {
     let two = [markers(), markers().named("/other")];
     let error = asked(&two, None).unwrap_err();
     assert_eq!(error.code(), "M006");
-    assert_eq!(error.help().unwrap(), "name one of them: topic = \"/markers\"");
+    assert_eq!(error.help().unwrap(), "name one of them in [fit]: topic = \"/markers\"");
     assert_eq!(asked(&two, Some("/other")).unwrap().source.topic, "/other");
 
     let error = asked(&two, Some("/markrs")).unwrap_err();

@@ -1,37 +1,22 @@
 //! `risorius check problem.toml`: everything but the solve.
 
-use super::problem::{Source, chosen_frames, recording_warnings};
+use super::prepare::{Clip, Prepared, prepare};
+use super::problem::Source;
+use super::terminal::print;
 use super::{Ending, Flags};
-use crate::error::Result;
-use crate::fit::Fit;
+use crate::error::{Missing, Result};
 use crate::model::Model;
-use crate::model::build::build;
-use crate::scene::{Scene, Task};
+use crate::scene::Scene;
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     let source = Source::read(path, flags)?;
-    let scene = &source.scene;
-    let built = build(scene)?;
-    let mut warnings = scene.warnings.clone();
-    warnings.extend(built.warnings);
-    print!("{}", describe(scene, &built.model));
-    if let (Task::Fit, Some(fit)) = (scene.task, &scene.fit) {
-        let recording = source.recording(fit)?;
-        warnings.extend(recording_warnings(&recording));
-        let frames = chosen_frames(fit, &recording)?;
-        let prepared = Fit::new(&built.model, scene, fit, &recording)?;
-        let farthest = prepared.markers().iter().map(|m| m.distance).fold(0.0, f64::max);
-        println!(
-            "recording: {} of {} frames, {} of {} labels used; farthest marker {farthest:.3} mm from the surface",
-            frames.len(),
-            recording.frames.len(),
-            prepared.markers().len(),
-            recording.labels.len()
-        );
-    }
+    let Prepared { built, clip, warnings } = prepare(&source)?;
+    let mut page = describe(&source.scene, &built.model);
+    page += &clip.as_ref().map(describe_clip).unwrap_or_default();
+    page += if warnings.is_empty() { "ok: no mistakes\n" } else { "ok: no mistakes, but see the warnings\n" };
     flags.warn(&warnings);
-    println!("ok: {}", if warnings.is_empty() { "no mistakes" } else { "no mistakes, but see the warnings" });
+    print(&page)?;
     Ok(if flags.strict && !warnings.is_empty() { Ending::Warned } else { Ending::Ok })
 }
 
@@ -54,9 +39,35 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
         text += &format!("  {:<20} {points:>8}\n", term.name());
     }
     text += &format!(
-        "one Newton iteration: factorisation of {:.2} Gflop, {:.1} MB of factor\n",
-        model.factor_flops() / 1e9,
+        "one Newton iteration: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
+        model.factor_flops() / 1e6,
         8e-6 * model.symbolic().factor_nnz() as f64
     );
     text
+}
+
+/// What a fit will use of its recording, and what is missing there.
+fn describe_clip(Clip { recording, frames, markers }: &Clip) -> String {
+    let health = &recording.health;
+    let labels: Vec<_> = markers.iter().map(|marker| &health.labels[marker.column]).collect();
+    let missing = labels.iter().fold(Missing::default(), |sum, label| sum.plus(label.missing));
+    let farthest = markers.iter().map(|marker| marker.distance).fold(0.0, f64::max);
+    let rate = health.rate_hz.map(|rate| format!(" at {rate:.1} Hz")).unwrap_or_default();
+    let mut text = format!(
+        "recording: {} of {} frames used, {:.2} s{rate}; {} of {} labels used\n",
+        frames.len(),
+        health.frames,
+        health.duration_s,
+        markers.len(),
+        recording.labels.len()
+    );
+    let (gaps, back, twice) = (health.gaps.len(), health.backward_steps, health.duplicate_stamps);
+    if gaps + back + twice > 0 {
+        text += &format!("  its clock has {gaps} gaps, {back} steps back in time, {twice} stamps twice\n");
+    }
+    text += &format!("  {} of {} samples are missing", missing.total(), labels.len() * health.frames);
+    if missing.total() > 0 {
+        text += &format!(": {missing}");
+    }
+    text + &format!("\n  the farthest marker is placed {farthest:.3} mm from the surface\n")
 }

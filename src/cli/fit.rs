@@ -2,26 +2,25 @@
 
 use super::Flags;
 use super::forward::probes;
+use super::prepare::Clip;
 use super::progress::Meter;
 use super::run::{Run, Tally};
+use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
-use crate::markers::Recording;
 use crate::model::build::Built;
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
 use crate::scene::{FitSpec, Scene};
 
 /// Fits every frame, writes it, prints the page.
-#[allow(clippy::too_many_arguments)] // the parts of one command, each of another kind
 pub(super) fn fit(
     scene: &Scene,
     spec: &FitSpec,
     built: &Built,
-    recording: &Recording,
-    frames: &[usize],
+    Clip { recording, frames, .. }: &Clip,
     run: &Run,
     flags: &Flags,
     work: &mut Work,
@@ -86,7 +85,7 @@ pub(super) fn fit(
     };
     let page = summary.to_string();
     run.folder.write("summary.txt", &page)?;
-    print!("{page}");
+    print(&page)?;
     Ok(tally)
 }
 

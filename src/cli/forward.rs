@@ -3,8 +3,9 @@
 use super::Flags;
 use super::progress::Meter;
 use super::run::{Run, Tally};
-use crate::cli::diagnostics::render_error;
-use crate::error::Result;
+use super::terminal::print;
+use crate::cli::diagnostics::{render_error, render_warning};
+use crate::error::{Result, Warning};
 use crate::fit::sequence::settings;
 use crate::forward::{Drive, Equilibrium, Solver, Work};
 use crate::model::build::Built;
@@ -41,9 +42,10 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
                     range.min, range.max
                 ));
                 if let Some(modes) = found.negative_modes.filter(|modes| *modes > 0) {
-                    meter.say(&format!(
-                        "warn[S005]: frame {index} is a saddle: the tangent has {modes} negative modes\n"
-                    ));
+                    tally.warned = true;
+                    if flags.shows_warnings() {
+                        meter.say(&render_warning(&saddle(frame, modes), flags.colour()));
+                    }
                 }
                 state.clone_from(&found.state);
                 last = Some((frame, found));
@@ -52,6 +54,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
                 meter.say(&render_error(&failure.error, flags.colour()));
                 let path = record.failed(frame, &failure.failed)?;
                 meter.say(&format!("  the iterate that failed: {}\n", path.display()));
+                meter.frame(format!("t {time_s:.3} s: failed"));
                 tally.failed.push(FailedFrame::new(index, &failure.error));
                 // the next frame starts from the last equilibrium on the way
                 state = failure.last_good;
@@ -81,9 +84,22 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
         };
         let page = summary.to_string();
         run.folder.write("summary.txt", &page)?;
-        print!("{page}");
+        print(&page)?;
     }
     Ok(tally)
+}
+
+/// An equilibrium that a small push would leave.
+fn saddle(frame: Frame, modes: usize) -> Warning {
+    Warning {
+        code: "S005",
+        message: format!(
+            "frame {} at {:.3} s is an equilibrium that is not stable: its tangent has {modes} negative modes",
+            frame.index, frame.time_s
+        ),
+        place: None,
+        help: Some("the body would buckle here: approach it in shorter steps (--set solver.step_max=0.05)".into()),
+    }
 }
 
 /// The probes of a scene with the places that were found for them.

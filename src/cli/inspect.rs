@@ -1,6 +1,7 @@
 //! `risorius inspect FILE`: what is in a marker recording.
 
 use super::Ending;
+use super::terminal::print;
 use crate::error::{Error, Result};
 use crate::markers;
 use std::path::Path;
@@ -13,9 +14,9 @@ pub(super) fn inspect(file: &Path, json: bool) -> Result<Ending> {
             path: "standard output".into(),
             source: error.into(),
         })?;
-        println!("{text}");
+        print(&(text + "\n"))?;
     } else {
-        print!("{inspection}");
+        print(&inspection.to_string())?;
     }
     Ok(Ending::Ok)
 }

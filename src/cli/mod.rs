@@ -8,10 +8,13 @@ pub mod diagnostics;
 mod fit;
 mod forward;
 mod inspect;
+mod prepare;
 mod problem;
 mod progress;
 mod run;
+mod terminal;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use diagnostics::{Colour, render_error, render_warning};
 use std::path::PathBuf;
@@ -112,10 +115,15 @@ impl Flags {
         when.on()
     }
 
+    /// Under `--strict` a warning is an error, which `-q` does not hide.
+    fn shows_warnings(&self) -> bool {
+        !self.quiet || self.strict
+    }
+
     fn warn(&self, warnings: &[Warning]) {
-        if !self.quiet || self.strict {
+        if self.shows_warnings() {
             for warning in warnings {
-                eprint!("{}", render_warning(warning, self.colour()));
+                terminal::tell(&render_warning(warning, self.colour()));
             }
         }
     }
@@ -143,15 +151,26 @@ impl Ending {
 
 /// Parses the arguments of the process, does what they say, and returns its exit code.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| with_tip(error).exit());
     let colour = cli.flags.colour();
     match in_threads(cli) {
         Ok(ending) => ExitCode::from(ending.exit_code()),
         Err(error) => {
-            eprint!("{}", render_error(&error, colour));
+            terminal::tell(&render_error(&error, colour));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// `risorius problem.toml` lacks a command; the message says which.
+fn with_tip(mut error: clap::Error) -> clap::Error {
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand)
+        && word.ends_with(".toml")
+    {
+        let tip = format!("to run a problem file, write: risorius run {word}").into();
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+    }
+    error
 }
 
 /// Runs a command in a pool of its own, so that `--threads` holds for all parallel work.

@@ -1,5 +1,6 @@
 //! Progress of long work on standard error: a bar on a terminal, a plain line per frame elsewhere.
 
+use super::terminal::tell;
 use super::{Flags, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -36,7 +37,7 @@ impl Meter {
             }
             Meter::Plain { done, of } => {
                 *done += 1;
-                eprintln!("{done}/{of} {what}");
+                tell(&format!("{done}/{of} {what}\n"));
             }
             Meter::Silent => {}
         }
@@ -45,8 +46,8 @@ impl Meter {
     /// A line that stays.
     pub fn say(&self, line: &str) {
         match self {
-            Meter::Bar(bar) => bar.suspend(|| eprint!("{line}")),
-            Meter::Plain { .. } | Meter::Silent => eprint!("{line}"),
+            Meter::Bar(bar) => bar.suspend(|| tell(line)),
+            Meter::Plain { .. } | Meter::Silent => tell(line),
         }
     }
 

@@ -1,13 +1,14 @@
 //! `risorius run [problem.toml]`: does what the problem's task says, and leaves a run folder.
 
 use super::check::describe;
-use super::problem::{Source, chosen_frames, recording_warnings};
+use super::prepare::{Clip, Prepared, prepare};
+use super::problem::Source;
+use super::terminal::tell;
 use super::{Ending, Flags, fit, forward};
 use crate::error::{Error, Result};
 use crate::forward::Work;
-use crate::markers::Recording;
 use crate::model::Model;
-use crate::model::build::{Built, build};
+use crate::model::build::Built;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, Task};
@@ -30,6 +31,8 @@ pub(super) struct Tally {
     pub frames_ok: usize,
     pub failed: Vec<FailedFrame>,
     pub interrupted: bool,
+    /// A warning came up on the way.
+    pub warned: bool,
 }
 
 impl Run {
@@ -54,25 +57,16 @@ impl Run {
 pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     let start = Instant::now();
     let mut source = Source::read(path, flags)?;
-    let built = build(&source.scene)?;
-    let mut warnings = source.scene.warnings.clone();
-    warnings.extend(built.warnings.iter().cloned());
     // the recording is read before anything is written: a mistake in it leaves no folder behind
-    let clip = match (source.scene.task, &source.scene.fit) {
-        (Task::Fit, Some(fit)) => {
-            let recording = source.recording(fit)?;
-            warnings.extend(recording_warnings(&recording));
-            let frames = chosen_frames(fit, &recording)?;
-            Some((recording, frames))
-        }
-        _ => None,
-    };
+    let Prepared { built, clip, warnings } = prepare(&source)?;
     flags.warn(&warnings);
     if flags.strict && !warnings.is_empty() {
+        let noun = if warnings.len() == 1 { "warning" } else { "warnings" };
+        tell(&format!("error: {} {noun} under --strict, nothing was run\n", warnings.len()));
         return Ok(Ending::Warned);
     }
     if !flags.quiet {
-        eprint!("{}", describe(&source.scene, &built.model));
+        tell(&describe(&source.scene, &built.model));
     }
     if flags.dry_run {
         return Ok(Ending::Ok);
@@ -92,39 +86,54 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     run.write_running(&Tally::default())?;
 
     let mut work = Work::default();
-    let outcome = task(&source, &built, clip, &run, flags, &mut work);
-    finish(&run, &built.model, &work, outcome)
+    let outcome = task(&source, &built, clip.as_ref(), &run, flags, &mut work);
+    finish(&run, &built.model, &work, outcome, flags.strict)
 }
 
 fn task(
     source: &Source,
     built: &Built,
-    clip: Option<(Recording, Vec<usize>)>,
+    clip: Option<&Clip>,
     run: &Run,
     flags: &Flags,
     work: &mut Work,
 ) -> Result<Tally> {
     match (clip, &source.scene.fit) {
-        (Some((recording, frames)), Some(spec)) => {
-            fit::fit(&source.scene, spec, built, &recording, &frames, run, flags, work)
-        }
+        (Some(clip), Some(spec)) => fit::fit(&source.scene, spec, built, clip, run, flags, work),
         _ => forward::forward(&source.scene, built, run, flags, work),
     }
 }
 
 /// Writes status and manifest whatever happened, and says how the command ends.
-fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>) -> Result<Ending> {
+fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>, strict: bool) -> Result<Ending> {
     run.manifest(model, work)?;
     match outcome {
         Ok(tally) => {
-            let Tally { frames_ok, failed, interrupted } = tally;
-            let converged = failed.is_empty();
-            if interrupted {
-                Status::interrupted(frames_ok, failed).write(&run.folder)?;
-                return Ok(Ending::Interrupted);
+            let Tally { frames_ok, failed, interrupted, warned } = tally;
+            let ending = match failed.len() {
+                _ if interrupted => Ending::Interrupted,
+                0 if warned && strict => Ending::Warned,
+                0 => Ending::Ok,
+                _ => Ending::NotConverged,
+            };
+            let folder = run.folder.path().display();
+            match ending {
+                Ending::Interrupted => {
+                    tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n"))
+                }
+                Ending::NotConverged => tell(&format!(
+                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json)\n",
+                    failed.len(),
+                    frames_ok + failed.len()
+                )),
+                Ending::Ok | Ending::Warned => {}
             }
-            Status::finished(frames_ok, failed).write(&run.folder)?;
-            Ok(if converged { Ending::Ok } else { Ending::NotConverged })
+            let status = match interrupted {
+                true => Status::interrupted(frames_ok, failed),
+                false => Status::finished(frames_ok, failed),
+            };
+            Status { exit: Some(ending.exit_code()), ..status }.write(&run.folder)?;
+            Ok(ending)
         }
         Err(error) => {
             Status::failed(0, Vec::new(), &error).write(&run.folder)?;
@@ -165,7 +174,7 @@ fn watch_interrupt() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     if ctrlc::set_handler(move || seen.store(true, Ordering::Relaxed)).is_err() {
-        eprintln!("note: Ctrl-C will end the run at once");
+        tell("note: Ctrl-C will end the run at once\n");
     }
     flag
 }

@@ -183,9 +183,12 @@ pub enum Error {
         /// The time of this row.
         place: Place,
     },
+    /// An error of a file that the problem names, with the line that names it; its code, help and exit code are its own.
+    #[error("{}", .0.0)]
+    Named(Box<(Error, Place)>),
     // ---- M: recording ---------------------------------------------------------------------------------
     /// The file is something else.
-    #[error("{} is not an MCAP file: its {bytes} bytes start with `{}`", path.display(), start.escape_ascii())]
+    #[error("{} is not an MCAP file: {}", path.display(), start_of(*bytes, start))]
     NotMcap {
         /// The file.
         path: PathBuf,
@@ -372,14 +375,14 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
-    /// The recording has none of the frames that a fit asks for.
-    #[error("the recording has {count} frames, numbered from 0: none is left from frame {first} on")]
-    NoSuchFrames {
-        /// First frame asked for.
-        first: usize,
+    /// The recording does not have the first or the last frame that a fit asks for.
+    #[error("the recording has {count} frames, 0 to {}: there is no frame {frame}", count.saturating_sub(1))]
+    NoSuchFrame {
+        /// Frame asked for, from 0.
+        frame: usize,
         /// Frames of the recording.
         count: usize,
-        /// The fit in the problem file.
+        /// The frames in the problem file.
         place: Box<Place>,
     },
     /// A marker lies far from the surface of the host.
@@ -481,8 +484,8 @@ pub enum Error {
     NotFactored,
     /// Newton's method found no equilibrium on the way to the asked load and controls.
     #[error(
-        "no equilibrium beyond {:.4} of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN",
-        reached
+        "no equilibrium beyond {:.2} % of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN",
+        100.0 * reached
     )]
     NotConverged {
         /// Part of the way, 0 to 1, at which the last equilibrium was found.
@@ -586,10 +589,19 @@ impl Error {
         }
     }
 
+    /// [`Error::mistakes`] by value.
+    pub fn into_mistakes(self) -> Vec<Error> {
+        match self {
+            Error::Mistakes(mistakes) => mistakes,
+            single => vec![single],
+        }
+    }
+
     /// The stable code, for example `S003`.
     pub fn code(&self) -> &'static str {
         match self {
             Error::Mistakes(_) => "C000",
+            Error::Named(named) => named.0.code(),
             Error::Syntax { .. } => "C001",
             Error::UnknownKey { .. } => "C002",
             Error::MissingKey { .. } => "C003",
@@ -620,7 +632,7 @@ impl Error {
             Error::UnitsLookWrong { .. } => "K001",
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
-            Error::NoSuchFrames { .. } => "K004",
+            Error::NoSuchFrame { .. } => "K004",
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -645,6 +657,7 @@ impl Error {
     /// The edit or command that mends it, where one is known.
     pub fn help(&self) -> Option<String> {
         match self {
+            Error::Named(named) => named.0.help(),
             Error::Mistakes(_) | Error::OutOfRange { .. } | Error::WrongLength { .. } => None,
             Error::Syntax { message, .. } => syntax_help(message),
             Error::UnknownKey { help, .. }
@@ -666,18 +679,18 @@ impl Error {
                 "copy the file again from where it was recorded, or save its good chunks with `mcap recover`".into(),
             ),
             Error::TruncatedRecording { .. } => {
-                Some("copy the file again, or set `allow_truncated` to use the intact part".into())
+                Some("copy the file again, or add allow_truncated = true to [fit] to use the intact part".into())
             }
-            Error::UncheckedRecording { .. } => {
-                Some("rewrite it with checksums (`mcap recover IN -o OUT`), or set `allow_unchecked`".into())
-            }
+            Error::UncheckedRecording { .. } => Some(
+                "rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into(),
+            ),
             Error::NoMarkerTopic { .. } => Some(
                 "record `mocap4r2_msgs/msg/Markers` (CDR), or JSON with a JSON schema that has `markers[]`".into(),
             ),
             Error::SeveralMarkerTopics { topics, .. } => topics
                 .iter()
                 .find(|topic| topic.is_readable())
-                .map(|topic| format!("name one of them: topic = \"{}\"", topic.name)),
+                .map(|topic| format!("name one of them in [fit]: topic = \"{}\"", topic.name)),
             Error::TopicNotFound { nearest, .. } => {
                 nearest.as_ref().map(|topic| format!("did you mean topic = \"{topic}\"?"))
             }
@@ -686,8 +699,10 @@ impl Error {
                 .find(|topic| topic.is_readable())
                 .map(|topic| format!("this one can be read: topic = \"{}\"", topic.name)),
             Error::EmptyTopic { .. } => Some("record again: was the driver running?".into()),
-            Error::NoSamples { missing, .. } => (missing.zero > 0)
-                .then(|| "all markers lie at (0, 0, 0): if they really do, set `zero_is_missing = false`".into()),
+            Error::NoSamples { missing, .. } if missing.zero > 0 => {
+                Some("if markers really lie at (0, 0, 0), add zero_is_missing = false to [fit]".into())
+            }
+            Error::NoSamples { .. } => Some("record again: did the cameras see the markers?".into()),
             Error::Undecodable { .. } => Some(
                 "the recorder stored another schema than the driver used: record again with matching messages".into(),
             ),
@@ -702,7 +717,10 @@ impl Error {
                 "its nearest point on the surface is position_mm = [{:.3}, {:.3}, {:.3}]; or raise fit.max_marker_distance_mm",
                 foot[0], foot[1], foot[2]
             )),
-            Error::NoSuchFrames { .. } => Some("choose other frames: frames = { first = 0 }".into()),
+            Error::NoSuchFrame { count, .. } => Some(format!(
+                "the whole recording is frames = {{ first = 0, last = {} }}; without `last` it goes on to its end",
+                count.saturating_sub(1)
+            )),
             Error::InvertedMesh { .. } => Some("check sizes and the order of nodes: sizes must be positive".into()),
             Error::MuscleOutside(_) => Some("move or shrink the muscle until it lies inside the host".into()),
             Error::InvertedMuscle { .. } => Some("check the muscle's size and the order of its nodes".into()),
@@ -768,8 +786,9 @@ impl Error {
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
-            | Error::NoSuchFrames { place, .. } => Some(place),
+            | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
+            Error::Named(named) => Some(&named.1),
             _ => None,
         }
     }
@@ -803,6 +822,11 @@ pub struct MuscleOutside {
     pub place: Place,
 }
 
+/// How a file of some length starts.
+fn start_of(bytes: u64, start: &[u8]) -> String {
+    if bytes == 0 { "it is empty".into() } else { format!("its {bytes} bytes start with `{}`", start.escape_ascii()) }
+}
+
 /// A mistake as a line of a list.
 fn one_line(mistake: &Error) -> String {
     let place = mistake.place().map(|place| format!("{place}: ")).unwrap_or_default();
@@ -830,6 +854,8 @@ fn wrong_type_help(key: &str, expected: &str, found: &str) -> Option<String> {
     let quoted_number = quoted.is_some_and(|text| text.trim().parse::<f64>().is_ok());
     if expected.ends_with("number") && quoted_number {
         Some("write the number without quotes".into())
+    } else if expected.ends_with("number") && found == "empty" {
+        Some("write a number in every cell; a muscle at rest is 0".into())
     } else if expected.starts_with("text") && !found.starts_with("text") {
         Some("write it in quotes".into())
     } else if expected == "a list of tables" && found == "a table" {

@@ -324,9 +324,18 @@ impl Missing {
 
 impl fmt::Display for Missing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Missing { absent, not_finite, zero, invalid, ambiguous } = self;
-        write!(f, "absent {absent}, not finite {not_finite}, (0, 0, 0) {zero}, ")?;
-        write!(f, "marked invalid {invalid}, label twice {ambiguous}")
+        let Missing { absent, not_finite, zero, invalid, ambiguous } = *self;
+        let kinds = [
+            (absent, "absent"),
+            (not_finite, "not finite"),
+            (zero, "at (0, 0, 0)"),
+            (invalid, "marked invalid"),
+            (ambiguous, "with their label twice"),
+        ];
+        let found = kinds.iter().filter(|(count, _)| *count > 0).map(|(count, kind)| format!("{count} {kind}"));
+        let found: Vec<_> = found.collect();
+        f.write_str(if found.is_empty() { "none" } else { "" })?;
+        f.write_str(&found.join(", "))
     }
 }
 

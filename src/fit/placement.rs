@@ -60,7 +60,8 @@ fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
     }
     let nearest = labels
         .iter()
-        .map(|label| (strsim::jaro_winkler(name, label), label))
+        // in one case, so that `lip.left` is nearer to `lip.L` than to `lip.R`
+        .map(|label| (strsim::jaro_winkler(&name.to_lowercase(), &label.to_lowercase()), label))
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, label)| label.as_str().into());
@@ -99,7 +100,7 @@ pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: 
         labels: pairs.len(),
         declared: fit.units.name(),
         likely: likely.unwrap_or(fit.units).name(),
-        place: Box::new(fit.place.clone()),
+        place: Box::new(fit.units_place.clone()),
     })
 }
 

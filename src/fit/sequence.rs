@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::model::{Model, State};
-use crate::scene::{ControlValue, FitSpec, Scene, SensitivitySpec};
+use crate::scene::{ControlValue, Curves, FitSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -20,8 +20,10 @@ pub struct Fit<'m> {
     markers: Vec<Marker>,
     /// Controls that are sought.
     unknowns: Vec<usize>,
-    /// Values of all controls where they are not sought.
+    /// Values of all controls where they are not sought and do not change.
     held: Vec<f64>,
+    /// Controls that follow a table over the time of the recording.
+    curves: Vec<(usize, Curves)>,
     sensitivity: Sensitivity,
     tolerance: f64,
     max_iterations: usize,
@@ -82,14 +84,17 @@ impl<'m> Fit<'m> {
         let index = |name: &String| model.controls().iter().position(|c| c.name == *name);
         let unknowns: Vec<usize> = fit.unknowns.iter().filter_map(index).collect();
         let mut held = vec![0.0; model.controls().len()];
+        let mut curves = Vec::new();
+        let muscles: Vec<String> = scene.muscles.iter().map(|muscle| muscle.name.clone()).collect();
         for control in &scene.controls {
-            if let (Some(k), ControlValue::Constant(value)) = (index(&control.name), &control.value)
-                && !unknowns.contains(&k)
-            {
-                held[k] = *value;
+            let Some(k) = index(&control.name).filter(|k| !unknowns.contains(k)) else { continue };
+            match &control.value {
+                ControlValue::Constant(value) => held[k] = *value,
+                ControlValue::Csv(path) => curves.push((k, Curves::read(path, &muscles)?)),
             }
         }
-        let start = Drive { controls: held.clone(), load: 1.0 };
+        let first_s = recording.frames.get(fit.frames.first).map_or(0.0, |frame| frame.time_s);
+        let start = Drive { controls: held_at(model, &held, &curves, first_s), load: 1.0 };
         let last = solver.equilibrium(&model.rest(), &start)?;
         let sensitivity = match fit.sensitivity {
             SensitivitySpec::Tangent => Sensitivity::Tangent,
@@ -101,6 +106,7 @@ impl<'m> Fit<'m> {
             markers,
             unknowns,
             held,
+            curves,
             sensitivity,
             tolerance: fit.tolerance,
             max_iterations: fit.max_iterations,
@@ -143,6 +149,7 @@ impl<'m> Fit<'m> {
             return Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s });
         }
 
+        let held = held_at(self.solver.model(), &self.held, &self.curves, shown.time_s);
         let controls = self.solver.model().controls();
         let ranges: Vec<Range> = self
             .unknowns
@@ -158,7 +165,7 @@ impl<'m> Fit<'m> {
             measured,
             &self.unknowns,
             self.sensitivity,
-            Drive { controls: self.held.clone(), load: 1.0 },
+            Drive { controls: held, load: 1.0 },
             self.last.clone(),
         );
         let solver = GaussNewton::new(ranges.clone(), self.tolerance);
@@ -250,6 +257,15 @@ impl<'m> Fit<'m> {
             iterations,
         })
     }
+}
+
+/// The controls that are not sought, at a time in seconds; those that are, are 0.
+fn held_at(model: &Model, held: &[f64], curves: &[(usize, Curves)], time_s: f64) -> Vec<f64> {
+    let mut held = held.to_vec();
+    for (k, curves) in curves {
+        held[*k] = curves.at(&model.controls()[*k].name, time_s).unwrap_or(held[*k]);
+    }
+    held
 }
 
 /// The solver settings of a scene.

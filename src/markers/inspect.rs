@@ -169,7 +169,8 @@ impl fmt::Display for Inspection {
         }
         let mut separator = "";
         for (compression, count) in &self.chunks {
-            write!(f, "{separator}{count} chunks ({compression})")?;
+            let noun = if *count == 1 { "chunk" } else { "chunks" };
+            write!(f, "{separator}{count} {noun} ({compression})")?;
             separator = ", ";
         }
         writeln!(f)?;

@@ -40,7 +40,7 @@ const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
 /// All geometric mistakes of the scene at once, each with its place: inverted elements, muscles or probes outside the
 /// host, supports that contradict each other.
 pub fn build(scene: &Scene) -> Result<Built> {
-    let mesh = host(&scene.mesh.block);
+    let mesh = host(scene);
     let space: &'static dyn PressureSpace = match scene.tissue.pressure {
         PressureSpec::Trilinear => &pressure::Trilinear,
         PressureSpec::DiscontinuousTrilinear => &pressure::DiscontinuousTrilinear,
@@ -114,7 +114,9 @@ pub fn build(scene: &Scene) -> Result<Built> {
     Ok(Built { model, probes, warnings })
 }
 
-fn host(spec: &BlockSpec) -> Mesh {
+/// The mesh of the host at rest.
+pub fn host(scene: &Scene) -> Mesh {
+    let spec = &scene.mesh.block;
     block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)
 }
 

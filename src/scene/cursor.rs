@@ -207,6 +207,12 @@ impl<'a> Table<'a> {
         self.node.place.clone()
     }
 
+    /// The value under a key, or the header of the table where it is absent.
+    pub fn place_of(&self, key: &str) -> Place {
+        let entry = self.node.entries().and_then(|entries| entries.iter().find(|entry| entry.key == key));
+        entry.map_or_else(|| self.place(), |entry| entry.node.place.clone())
+    }
+
     /// The value of a key, if it is there.
     pub fn item(&mut self, key: &'static str) -> Option<Item<'a>> {
         self.asked.push(key);

@@ -85,13 +85,23 @@ fn task(table: &mut Table) -> Option<Task> {
     table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &later))
 }
 
+/// More than this is a slip of the keyboard: no machine factorises it.
+const MOST_ELEMENTS: usize = 100_000;
+
 fn block(table: &mut Table) -> Option<BlockSpec> {
     let origin_mm = table.required("origin_mm", "origin_mm = [0, 0, 0]", |item| item.numbers(FINITE));
     let size_mm = table.required("size_mm", "size_mm = [60, 20, 20]", |item| item.numbers(POSITIVE));
     let elements = table.required("elements", "elements = [6, 2, 2]", |item| {
         item.triple("a list of 3 whole numbers", |item| item.whole(1, 1000))
     });
-    Some(BlockSpec { origin_mm: origin_mm?, size_mm: size_mm?, elements: elements? })
+    let elements = elements?;
+    if elements.iter().product::<usize>() > MOST_ELEMENTS {
+        let [x, y, z] = elements;
+        let written = format!("[{x}, {y}, {z}]");
+        let allowed = format!("at most {MOST_ELEMENTS} elements in all");
+        return table.item("elements")?.out_of_range(&written, &allowed);
+    }
+    Some(BlockSpec { origin_mm: origin_mm?, size_mm: size_mm?, elements })
 }
 
 fn mesh(table: &mut Table) -> Option<MeshSpec> {
@@ -250,17 +260,22 @@ fn marker(table: &mut Table) -> Option<MarkerSpec> {
 
 fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
+    let markers_place = table.place_of("markers");
     let units = Units::ALL.map(|units| (units.name(), units));
     let units = table.required("units", "units = \"m\"", |item| item.choice(&units, &[]));
+    let units_place = table.place_of("units");
     let topic = table.optional("topic", |item| item.name());
     let sensitivities =
         [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
     let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
     let unknowns = table.or("unknowns", references.muscles(), |item| references.unknowns(&item));
     let zero_is_missing = table.or("zero_is_missing", true, |item| item.flag());
+    let allow_truncated = table.or("allow_truncated", false, |item| item.flag());
+    let allow_unchecked = table.or("allow_unchecked", false, |item| item.flag());
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
+    let frames_place = table.place_of("frames");
     let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
     let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
@@ -271,6 +286,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         sensitivity: sensitivity?,
         unknowns: unknowns?,
         zero_is_missing: zero_is_missing?,
+        allow_truncated: allow_truncated?,
+        allow_unchecked: allow_unchecked?,
         sd_mm: sd_mm?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
@@ -278,6 +295,9 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         max_iterations: max_iterations?,
         finite_difference_step: finite_difference_step?,
         place: table.place(),
+        markers_place,
+        units_place,
+        frames_place,
     })
 }
 

@@ -187,6 +187,8 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         sensitivity,
         unknowns,
         zero_is_missing,
+        allow_truncated,
+        allow_unchecked,
         sd_mm,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
@@ -194,6 +196,9 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         max_iterations,
         finite_difference_step,
         place: _,
+        markers_place: _,
+        units_place: _,
+        frames_place: _,
     } = fit;
     let sensitivity = match sensitivity {
         SensitivitySpec::Tangent => "tangent",
@@ -207,6 +212,8 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         format!("sensitivity = \"{sensitivity}\""),
         format!("unknowns = [{unknowns}]"),
         format!("zero_is_missing = {zero_is_missing}"),
+        format!("allow_truncated = {allow_truncated}"),
+        format!("allow_unchecked = {allow_unchecked}"),
     ]);
     lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
     lines.extend([

@@ -290,6 +290,10 @@ pub struct FitSpec {
     pub unknowns: Vec<String>,
     /// Whether a sample at exactly (0, 0, 0) is a lost marker.
     pub zero_is_missing: bool,
+    /// Whether the intact part of a recording that is cut short will do.
+    pub allow_truncated: bool,
+    /// Whether a recording will do in which damage would go unseen, because its writer computed no checksums.
+    pub allow_unchecked: bool,
     /// The standard deviation of the measurement per coordinate, mm, if it is known.
     pub sd_mm: Option<f64>,
     /// A marker further than this from the surface of the model is a mistake, mm.
@@ -306,6 +310,15 @@ pub struct FitSpec {
     /// The table in the file.
     #[serde(skip)]
     pub place: Place,
+    /// The name of the recording.
+    #[serde(skip)]
+    pub markers_place: Place,
+    /// Its unit of length.
+    #[serde(skip)]
+    pub units_place: Place,
+    /// Its choice of frames; the table where it has none.
+    #[serde(skip)]
+    pub frames_place: Place,
 }
 
 /// How the derivative of the shape by the activations is found: `[fit] sensitivity`.

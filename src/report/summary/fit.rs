@@ -43,6 +43,12 @@ pub struct FitSummary<'a> {
     pub folder: &'a str,
 }
 
+/// A standard deviation with two significant digits, since a fixed number of them would show most as 0.
+fn deviation(sd: Option<f64>) -> String {
+    let Some(sd) = sd.filter(|sd| sd.is_finite()) else { return "-".into() };
+    if sd > 0.0 && sd < 1e-3 { format!("{sd:.1e}") } else { format!("{sd:.4}") }
+}
+
 impl fmt::Display for FitSummary<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(out, "{}: {} fitted", self.name, count(self.frames.len(), "frame"))?;
@@ -72,7 +78,7 @@ impl FitSummary<'_> {
                 Bound::Upper => "at its upper bound",
             };
             let value = format!("{:.4}", fitted.values[control]);
-            [name.to_string(), value, optional(fitted.deviations[control], 4), bound.to_owned()]
+            [name.to_string(), value, deviation(fitted.deviations[control]), bound.to_owned()]
         };
         let rows: Vec<_> = self.controls.iter().enumerate().map(row).collect();
         out.write_str(&columns(["muscle", "activation", "sd", ""], &rows))
@@ -90,7 +96,7 @@ impl FitSummary<'_> {
                 name.to_string(),
                 format!("{least:.4}"),
                 format!("{:.4}", peak.values[control]),
-                optional(peak.deviations[control], 4),
+                deviation(peak.deviations[control]),
                 peak.frame.index.to_string(),
                 at(Bound::Lower).to_string(),
                 at(Bound::Upper).to_string(),

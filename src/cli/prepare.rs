@@ -1,0 +1,64 @@
+//! Everything that comes before the first solve: the model, the recording, and what is wrong with either.
+
+use super::problem::{Source, chosen_frames, recording_warnings};
+use crate::error::{Error, Result, Warning};
+use crate::fit::placement::{Marker, check_units, place};
+use crate::markers::Recording;
+use crate::model::build::{Built, build, host};
+use crate::scene::{FitSpec, Scene, Task};
+
+/// A problem that can be solved.
+pub(super) struct Prepared {
+    pub built: Built,
+    /// Present where the task is a fit.
+    pub clip: Option<Clip>,
+    pub warnings: Vec<Warning>,
+}
+
+/// A recording on a model.
+pub(super) struct Clip {
+    pub recording: Recording,
+    /// The frames to fit.
+    pub frames: Vec<usize>,
+    pub markers: Vec<Marker>,
+}
+
+/// Builds the model and places the recording on it.
+///
+/// # Errors
+/// All mistakes of geometry, recording and markers at once.
+pub(super) fn prepare(source: &Source) -> Result<Prepared> {
+    let scene = &source.scene;
+    let built = build(scene);
+    let clip = match (scene.task, &scene.fit) {
+        (Task::Fit, Some(fit)) => clip(source, scene, fit).map(Some),
+        _ => Ok(None),
+    };
+    match (built, clip) {
+        (Ok(built), Ok(clip)) => {
+            let mut warnings = scene.warnings.clone();
+            warnings.extend(built.warnings.iter().cloned());
+            warnings.extend(clip.iter().flat_map(|clip| recording_warnings(&clip.recording)));
+            Ok(Prepared { built, clip, warnings })
+        }
+        (built, clip) => {
+            let mistakes = [built.err(), clip.err()].into_iter().flatten();
+            Err(Error::all(mistakes.flat_map(Error::into_mistakes).collect()))
+        }
+    }
+}
+
+fn clip(source: &Source, scene: &Scene, fit: &FitSpec) -> Result<Clip> {
+    let recording = source.recording(fit)?;
+    let mesh = host(scene);
+    let frames = chosen_frames(fit, &recording);
+    let markers = place(scene, fit, &mesh, &recording)
+        .and_then(|markers| check_units(&markers, &mesh, &recording, fit).map(|()| markers));
+    match (frames, markers) {
+        (Ok(frames), Ok(markers)) => Ok(Clip { recording, frames, markers }),
+        (frames, markers) => {
+            let mistakes = [frames.err(), markers.err()].into_iter().flatten();
+            Err(Error::all(mistakes.flat_map(Error::into_mistakes).collect()))
+        }
+    }
+}
