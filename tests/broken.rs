@@ -194,7 +194,7 @@ fn an_inverted_muscle_is_refused_with_its_element_and_determinant() {
     let angles = FibreAngles::uniform(&mesh, [0.0; 3]);
     let law = Blemker { sigma_max: 300.0, lambda_star: 1.4, lambda_ofl: 1.0, p1: 0.005, p2: 6.6 };
     let locator = Locator::new(&host);
-    match Muscle::new("slab", &host, &locator, &mesh, &angles, 3, law, 0) {
+    match Muscle::new("slab", &locator, &mesh, &angles, 3, law, 0) {
         // from x = 26.5 to x = 20: dX/deta = diag(-6.5, 3, 3) mm
         Err(NotEmbedded::Inverted { element: 3, det }) => assert!((det + 58.5).abs() < 1e-9, "{det}"),
         Err(other) => panic!("{other:?}"),

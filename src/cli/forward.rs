@@ -90,7 +90,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
 }
 
 /// An equilibrium that a small push would leave.
-fn saddle(frame: Frame, modes: usize) -> Warning {
+pub(super) fn saddle(frame: Frame, modes: usize) -> Warning {
     Warning {
         code: "S005",
         message: format!(
