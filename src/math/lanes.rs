@@ -99,7 +99,7 @@ pub fn cofactors(m: &MatrixLanes) -> MatrixLanes {
     c
 }
 
-/// a[0] b[0] + a[1] b[1] + a[2] b[2]
+/// a . b
 #[inline(always)]
 pub fn dot(a: [Lanes; 3], b: [Lanes; 3]) -> Lanes {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
