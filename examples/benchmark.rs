@@ -4,7 +4,9 @@
 //! factorisation and solves, beside the machine's own dense matrix product of the same minute; and the time per frame of
 //! the default fit. Medians of repeated runs on all threads of the pool; compare ratios, not absolute times.
 
+use risorius::fit::Fit;
 use risorius::forward::{Drive, Solver};
+use risorius::markers::{ReadOptions, read};
 use risorius::math::factor::Factor;
 use risorius::model::build::build;
 use risorius::model::{Model, Workspace};
@@ -55,6 +57,41 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("threads {}", rayon::current_num_threads());
     stages("slab beam, 6 x 2 x 2 elements", SLAB)?;
     stages("block of 20 x 28 x 1 elements", FACE_SIZED)?;
+    fitted_frames()
+}
+
+/// Times the frames of the default fit.
+fn fitted_frames() -> Result<(), Box<dyn std::error::Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/beam/problem.toml");
+    let scene = Scene::read(&path, &[])?;
+    let spec = scene.fit.as_ref().ok_or("problems/beam is a fit")?;
+    let model = build(&scene)?.model;
+    let recording = read(&spec.markers, &ReadOptions { units: spec.units, ..ReadOptions::default() })?;
+    let mut fit = Fit::new(&model, &scene, spec, &recording)?;
+    let mut seconds = Vec::new();
+    let mut factorisations = Vec::new();
+    for k in 0..recording.frames.len() {
+        let before = fit.work().linear.factorisations;
+        let start = Instant::now();
+        fit.frame(&recording, k)?;
+        seconds.push(start.elapsed().as_secs_f64());
+        factorisations.push(fit.work().linear.factorisations - before);
+    }
+    seconds.sort_by(f64::total_cmp);
+    factorisations.sort_unstable();
+    let half = seconds.len() / 2;
+    println!(
+        "\ndefault fit: {} frames, {} controls, {} markers",
+        seconds.len(),
+        model.controls().len(),
+        scene.markers.len()
+    );
+    println!(
+        "  a frame, median                      {:8.2} ms   {} factorisations",
+        1e3 * seconds[half],
+        factorisations[half]
+    );
+    println!("  the slowest                          {:8.2} ms", 1e3 * seconds[seconds.len() - 1]);
     Ok(())
 }
 
@@ -99,7 +136,7 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
         })
     };
     let (one, thirty) = (solve(1, &mut factor), solve(30, &mut factor));
-    let flops = 2.0 * model.factor_flops() / 2.0;
+    let flops = model.factor_flops();
 
     let sizes = |model: &Model| (model.mesh().elements(), model.mesh().nodes, model.numbering().unknowns());
     let (elements, nodes, unknowns) = sizes(&model);

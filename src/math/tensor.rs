@@ -72,7 +72,7 @@ pub fn inverse(m: &Matrix, det: f64) -> Matrix {
 }
 
 /// The rotation by `angle` (radians) about the unit vector `axis`:
-/// R = cos(angle) I + sin(angle) [axis]x + (1 - cos(angle)) axis axis^T  (Rodrigues).
+/// R = cos(angle) I + sin(angle) axis x I + (1 - cos(angle)) axis axis^T  (Rodrigues).
 pub fn rotation(axis: Vector, angle: f64) -> Matrix {
     let (sine, cosine) = angle.sin_cos();
     let [x, y, z] = axis;
