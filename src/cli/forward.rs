@@ -52,8 +52,13 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
             }
             Err(failure) => {
                 meter.say(&render_error(&failure.error, flags.colour()));
-                let path = record.failed(frame, &failure.failed)?;
-                meter.say(&format!("  the iterate that failed: {}\n", path.display()));
+                let [last_good, failed] = record.failed(frame, &failure)?;
+                meter.say(&format!(
+                    "  written: the last equilibrium, {:.1} % of the way: {}; the iterate that failed: {}\n",
+                    100.0 * failure.reached,
+                    last_good.display(),
+                    failed.display()
+                ));
                 meter.frame(format!("t {time_s:.3} s: failed"));
                 tally.failed.push(FailedFrame::new(index, &failure.error));
                 // the next frame starts from the last equilibrium on the way

@@ -7,9 +7,10 @@ use super::tables::{
 };
 use super::view::View;
 use crate::error::Result;
-use crate::forward::{Equilibrium, Work};
+use crate::forward::{Equilibrium, Failure, Work};
 use crate::model::{Model, State};
 use crate::scene::OutputSpec;
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// The tables and shapes of a run.
@@ -93,12 +94,14 @@ impl<'a> Record<'a> {
         Ok(())
     }
 
-    /// Writes the shape at which a frame failed; returns the path of the file.
+    /// Writes the last equilibrium on the way to a frame that failed, and the iterate at which it failed; returns the paths
+    /// of the two files.
     ///
     /// # Errors
-    /// Where it cannot be written.
-    pub fn failed(&self, frame: Frame, state: &State) -> Result<std::path::PathBuf> {
-        self.view.write_failed(frame, self.model, state)
+    /// Where they cannot be written.
+    pub fn failed(&self, frame: Frame, failure: &Failure) -> Result<[PathBuf; 2]> {
+        let write = |name: &str, state: &State| self.view.write_beside(name, frame, self.model, state);
+        Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }
 
     /// Writes the table of costs.

@@ -55,12 +55,12 @@ impl View {
         Ok(())
     }
 
-    /// Writes the iterate at which a frame failed as `failed.vtu`; returns its path.
+    /// Writes a state beside the frames, for example the iterate at which one failed, as `<name>.vtu`; returns its path.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
-    pub fn write_failed(&self, frame: Frame, model: &Model, state: &State) -> Result<PathBuf> {
-        let path = self.folder.join("failed.vtu");
+    pub fn write_beside(&self, name: &str, frame: Frame, model: &Model, state: &State) -> Result<PathBuf> {
+        let path = self.folder.join(format!("{name}.vtu"));
         bezier::shape(model, state, frame.time_s).write(&path)?;
         Ok(path)
     }

@@ -13,16 +13,17 @@ use crate::report::run_folder::RunFolder;
 pub struct EnergyTable(Table);
 
 impl EnergyTable {
-    /// A new table: `frame,time_s,tissue_uj,<muscle>_uj,...,external_work_uj,det_f_min,det_f_max`, then for every
-    /// support that rotates, counted among these from 0 in the order of the scene, `torque_<n>_mn_mm` (about its
-    /// axis) and `axial_force_<n>_mn` (along it) that it exerts on the body.
+    /// A new table: `frame,time_s,tissue_uj,<muscle>_uj,...,external_work_uj,det_f_min,det_f_max,negative_modes` (of the
+    /// tangent beyond one per pressure: more than none is a saddle), then for every support that rotates, counted among
+    /// these from 0 in the order of the scene, `torque_<n>_mn_mm` (about its axis) and `axial_force_<n>_mn` (along it) that
+    /// it exerts on the body.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io), here and below.
     pub fn create(run: &RunFolder, model: &Model) -> Result<EnergyTable> {
         let mut columns: Vec<String> = ["frame", "time_s", "tissue_uj"].map(String::from).into();
         columns.extend(model.muscles().map(|(term, _)| format!("{}_uj", model.terms()[term].name())));
-        columns.extend(["external_work_uj", "det_f_min", "det_f_max"].map(String::from));
+        columns.extend(["external_work_uj", "det_f_min", "det_f_max", "negative_modes"].map(String::from));
         let rotations = model.supports().iter().filter(|support| matches!(support, Support::Rotate { .. }));
         for (n, _) in rotations.enumerate() {
             columns.extend([format!("torque_{n}_mn_mm"), format!("axial_force_{n}_mn")]);
@@ -39,6 +40,7 @@ impl EnergyTable {
         cells.extend(model.muscles().map(|(term, _)| Cell::Number(evaluation.energies[term])));
         cells.push(model.external_work(&equilibrium.state).into());
         cells.extend([evaluation.det_f.min, evaluation.det_f.max].map(Cell::Number));
+        cells.push(equilibrium.negative_modes.map_or(Cell::Empty, Cell::Count));
         let x = model.current(&equilibrium.state);
         let reactions = model.supports().rotation_reactions(model.mesh(), &evaluation.force, &x);
         cells.extend(reactions.iter().flat_map(|(torque, axial)| [*torque, *axial]).map(Cell::Number));
