@@ -745,8 +745,8 @@ impl Error {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
             }
             Error::NotConverged { .. } => Some(
-                "the last equilibrium is kept; try shorter steps (--set solver.step_max=0.05), a volumetric term \
-                 (--set tissue.kappa_kpa=10), a finer mesh where det F is small, or a smaller load"
+                "the last equilibrium is kept; let the steps become shorter (--set solver.step_min=1e-6), or try a volumetric \
+                 term (tissue.kappa_kpa), a finer mesh where det F is small, a smaller load or activation"
                     .into(),
             ),
             Error::Singular { .. } => {
