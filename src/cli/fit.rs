@@ -45,7 +45,7 @@ pub(super) fn fit(
             Ok(estimate) => {
                 let markers = pairs(&names, &estimate);
                 errors.add(frame, &markers);
-                record.frame(frame, &estimate.equilibrium, &estimate.sd, &markers)?;
+                record.frame(frame, &estimate.equilibrium, &estimate.sd, &markers, &estimate.iterations)?;
                 tally.frames_ok += 1;
                 meter.frame(format!(
                     "t {:.3} s: rms {:.3} mm, {} steps, {} factorisations",

@@ -33,7 +33,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
         let before = solver.work().iterations;
         match solver.equilibrium(&state, drive) {
             Ok(found) => {
-                record.frame(frame, &found, &[], &[])?;
+                record.frame(frame, &found, &[], &[], &[])?;
                 tally.frames_ok += 1;
                 let iterations = solver.work().iterations - before;
                 let range = found.evaluation.det_f;

@@ -8,10 +8,12 @@ use super::sensitivity::Sensitivity;
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
-use crate::model::{Model, State};
+use crate::math::tensor::{norm, subtract};
+use crate::model::{Control, Model};
 use crate::scene::{ControlValue, Curves, FitSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
+use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The fit of a recording.
@@ -137,28 +139,50 @@ impl<'m> Fit<'m> {
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
         let shown = &recording.frames[frame];
         let measured_mm: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
-        let measured: Vec<Measured> = measured_mm
-            .iter()
-            .enumerate()
-            .filter_map(|(marker, position)| {
-                let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
-                position.map(|position| Measured { marker, position, weight })
-            })
-            .collect();
+        let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
+            let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
+            position.map(|position| Measured { marker, position, weight })
+        };
+        let measured: Vec<Measured> = measured_mm.iter().enumerate().filter_map(weigh).collect();
         if measured.is_empty() {
             return Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s });
         }
+        let residuals = 3 * measured.len();
+        let optimum = self.optimise(frame, shown.time_s, measured)?;
+        let (bounds, sd) = self.uncertainty(&optimum, residuals);
+        self.last = optimum.equilibrium;
 
-        let held = held_at(self.solver.model(), &self.held, &self.curves, shown.time_s);
-        let controls = self.solver.model().controls();
-        let ranges: Vec<Range> = self
-            .unknowns
-            .iter()
-            .map(|k| Range { lower: controls[*k].lower, upper: controls[*k].upper, onset: controls[*k].onset })
-            .collect();
+        let model = self.solver.model();
+        let x = model.current(&self.last.state);
+        let positions_mm: Vec<[f64; 3]> =
+            self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
+        let pairs = positions_mm.iter().zip(&measured_mm);
+        let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
+        Ok(Estimate {
+            frame,
+            time_s: shown.time_s,
+            equilibrium: self.last.clone(),
+            sd,
+            bounds,
+            rms_mm: (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt(),
+            max_mm: distances.iter().copied().fold(0.0, f64::max),
+            positions_mm,
+            measured_mm,
+            iterations: optimum.iterations,
+        })
+    }
+
+    /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
+    fn optimise(&mut self, frame: usize, time_s: f64, measured: Vec<Measured>) -> Result<Optimum> {
+        let model = self.solver.model();
+        let held = held_at(model, &self.held, &self.curves, time_s);
+        let range = |k: &usize| {
+            let control = &model.controls()[*k];
+            Range { lower: control.lower, upper: control.upper, onset: control.onset }
+        };
+        let ranges = self.unknowns.iter().map(range).collect();
         let start: Vec<f64> = self.unknowns.iter().map(|k| self.last.state.controls[*k]).collect();
         let log = Log::default();
-        let residual_count = 3 * measured.len();
         let problem = FrameProblem::new(
             &mut self.solver,
             &self.markers,
@@ -168,10 +192,9 @@ impl<'m> Fit<'m> {
             Drive { controls: held, load: 1.0 },
             self.last.clone(),
         );
-        let solver = GaussNewton::new(ranges.clone(), self.tolerance);
-        let iterations = self.max_iterations as u64;
-        let mut result = Executor::new(problem, solver)
-            .configure(|state: GaussNewtonState| state.param(start).max_iters(iterations))
+        let most = self.max_iterations as u64;
+        let mut result = Executor::new(problem, GaussNewton::new(ranges, self.tolerance))
+            .configure(|state: GaussNewtonState| state.param(start).max_iters(most))
             .add_observer(log.clone(), ObserverMode::Always)
             .timer(false)
             .ctrlc(false)
@@ -185,78 +208,56 @@ impl<'m> Fit<'m> {
             TerminationStatus::Terminated(TerminationReason::MaxItersReached) => Some("the iterations were used up"),
             TerminationStatus::Terminated(_) | TerminationStatus::NotTerminated => Some("it was ended from outside"),
         };
-        if let Some(reason) = reason {
-            return Err(Error::FitNotConverged {
+        match (reason, result.problem.take_problem(), result.state.take_jacobian()) {
+            (None, Some(problem), Some(jacobian)) => Ok(Optimum {
+                equilibrium: problem.into_equilibrium(),
+                jacobian,
+                cost: result.state.get_cost(),
+                iterations,
+            }),
+            (reason, ..) => Err(Error::FitNotConverged {
                 frame,
                 iterations: iterations.len(),
-                reason,
+                reason: reason.unwrap_or("the optimiser lost its state"),
                 step: iterations.last().map_or(f64::INFINITY, |i| i.step),
                 required: self.tolerance,
-            });
+            }),
         }
-        let jacobian = result.state.take_jacobian();
-        let cost = result.state.get_cost();
-        let Some(problem) = result.problem.take_problem() else {
-            return Err(Error::FitNotConverged {
-                frame,
-                iterations: iterations.len(),
-                reason: "the problem was lost",
-                step: f64::INFINITY,
-                required: self.tolerance,
-            });
-        };
-        self.last = problem.into_equilibrium();
-
-        let model = self.solver.model();
-        let state: &State = &self.last.state;
-        let mut bounds = vec![Bound::Free; model.controls().len()];
-        for (k, bound) in bounds.iter_mut().enumerate() {
-            let (value, control) = (state.controls[k], &model.controls()[k]);
-            if value <= control.lower {
-                *bound = Bound::Lower;
-            } else if value >= control.upper {
-                *bound = Bound::Upper;
-            }
-        }
-        let mut sd = vec![None; model.controls().len()];
-        if let Some(jacobian) = jacobian {
-            let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
-            let free = sought.iter().filter(|b| **b == Bound::Free).count();
-            // unit variance where deviations are known, the residuals' own where they are not
-            let variance = if self.known_sd {
-                Some(1.0)
-            } else {
-                (residual_count > free).then(|| 2.0 * cost / (residual_count - free) as f64)
-            };
-            if let Some(variance) = variance {
-                for (k, unit) in self.unknowns.iter().zip(standard_deviations(&jacobian, &sought)) {
-                    sd[*k] = unit.map(|unit| unit * variance.sqrt());
-                }
-            }
-        }
-        let x = model.current(state);
-        let positions_mm: Vec<[f64; 3]> =
-            self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
-        let distances: Vec<f64> = positions_mm
-            .iter()
-            .zip(&measured_mm)
-            .filter_map(|(x, z)| z.map(|z| crate::math::tensor::norm(crate::math::tensor::subtract(*x, z))))
-            .collect();
-        let rms_mm = (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt();
-        let max_mm = distances.iter().copied().fold(0.0, f64::max);
-        Ok(Estimate {
-            frame,
-            time_s: shown.time_s,
-            equilibrium: self.last.clone(),
-            sd,
-            bounds,
-            positions_mm,
-            measured_mm,
-            rms_mm,
-            max_mm,
-            iterations,
-        })
     }
+
+    /// Where the controls lie, and their standard deviations: with the given deviations of the markers, or with what the
+    /// `residuals` of the frame estimate where not all are given.
+    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>) {
+        let values = optimum.equilibrium.state.controls.iter();
+        let bound = |(value, control): (&f64, &Control)| match value {
+            value if *value <= control.lower => Bound::Lower,
+            value if *value >= control.upper => Bound::Upper,
+            _ => Bound::Free,
+        };
+        let bounds: Vec<Bound> = values.zip(self.solver.model().controls()).map(bound).collect();
+        let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
+        let free = sought.iter().filter(|b| **b == Bound::Free).count();
+        let variance = if self.known_sd {
+            Some(1.0)
+        } else {
+            (residuals > free).then(|| 2.0 * optimum.cost / (residuals - free) as f64)
+        };
+        let mut sd = vec![None; bounds.len()];
+        for (k, unit) in self.unknowns.iter().zip(standard_deviations(&optimum.jacobian, &sought)) {
+            sd[*k] = unit.zip(variance).map(|(unit, variance)| unit * variance.sqrt());
+        }
+        (bounds, sd)
+    }
+}
+
+/// Where the iteration of a frame ended.
+struct Optimum {
+    equilibrium: Equilibrium,
+    /// d(weighted residual)/d(unknown control).
+    jacobian: DMatrix<f64>,
+    /// 1/2 sum of squared weighted residuals.
+    cost: f64,
+    iterations: Vec<FitIteration>,
 }
 
 /// The controls that are not sought, at a time in seconds; those that are, are 0.

@@ -3,10 +3,11 @@
 use super::frame::{Frame, MarkerPair, Probe, muscle_states, probe_states};
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, ConvergenceTable, EnergyTable, MarkerTable, MuscleTable, ProbeTable, write_cost,
+    ActivationTable, ConvergenceTable, EnergyTable, FitTable, MarkerTable, MuscleTable, ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
+use crate::fit::sequence::FitIteration;
 use crate::forward::{Equilibrium, Failure, Work};
 use crate::model::{Model, State};
 use crate::scene::OutputSpec;
@@ -23,7 +24,7 @@ pub struct Record<'a> {
     energies: EnergyTable,
     convergence: ConvergenceTable,
     muscles: Option<MuscleTable>,
-    markers: Option<MarkerTable>,
+    fit: Option<(MarkerTable, FitTable)>,
     probe_table: Option<ProbeTable>,
     view: View,
     frames: usize,
@@ -53,7 +54,7 @@ impl<'a> Record<'a> {
             energies: EnergyTable::create(run, model)?,
             convergence: ConvergenceTable::create(run)?,
             muscles: model.muscles().next().map(|_| MuscleTable::create(run)).transpose()?,
-            markers: fitted.then(|| MarkerTable::create(run)).transpose()?,
+            fit: if fitted { Some((MarkerTable::create(run)?, FitTable::create(run)?)) } else { None },
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
             view: View::new(run),
             frames: 0,
@@ -61,7 +62,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Writes a frame. `deviations` and `markers` are empty for a task that has none.
+    /// Writes a frame. `deviations`, `markers` and `iterations` of a fit are empty for a task that has none.
     ///
     /// # Errors
     /// Where a file cannot be written.
@@ -71,6 +72,7 @@ impl<'a> Record<'a> {
         equilibrium: &Equilibrium,
         deviations: &[Option<f64>],
         markers: &[MarkerPair<'_>],
+        iterations: &[FitIteration],
     ) -> Result<()> {
         let start = Instant::now();
         let state = &equilibrium.state;
@@ -80,8 +82,9 @@ impl<'a> Record<'a> {
         if let Some(table) = &mut self.muscles {
             table.add(frame, &muscle_states(self.model, state, &equilibrium.evaluation))?;
         }
-        if let Some(table) = &mut self.markers {
+        if let Some((table, fit)) = &mut self.fit {
             table.add(frame, markers)?;
+            fit.add(frame, iterations)?;
         }
         if let Some(table) = &mut self.probe_table {
             table.add(frame, state, &probe_states(self.probes, self.model, state))?;
