@@ -355,7 +355,7 @@ fn a_forward_solve_that_does_not_converge_says_how_far_it_came() {
         "worst point: element",
         "residual",
         "view/failed.vtu",
-        "solver.step_max=",
+        "solver.step_min=",
         "1/1 t 0.000 s: failed",
         "not converged: 1 of 1 frames",
     ] {
