@@ -87,7 +87,8 @@ impl Law for Guccione {
             let mut in_axes = [[Lanes::ZERO; 3]; 3];
             for a in 0..3 {
                 for c in 0..3 {
-                    let mut sum = twice_inverse * rotated[i][a] * rotated[k][c] + half * (b[a][c] * (g[i][c] * g[k][a]));
+                    let mut sum =
+                        twice_inverse * rotated[i][a] * rotated[k][c] + half * (b[a][c] * (g[i][c] * g[k][a]));
                     if a == c {
                         for d in 0..3 {
                             sum += half * (b[a][d] * (g[i][d] * g[k][d]));
