@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, Scene, SupportKind, Task, Units,
+    ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, PartSpec, Scene, SupportKind, Task, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -86,8 +86,8 @@ fn a_whole_file_means_what_it_says() {
     let scene = parse(WHOLE, &[]).unwrap();
     assert_eq!((scene.name.as_str(), scene.task), ("smile", Task::Fit));
     assert_eq!((scene.mesh.block.size_mm, scene.mesh.block.elements), ([60.0, 20.0, 20.0], [6, 2, 2]));
-    let LawSpec::MooneyRivlin { c1_kpa, c2_kpa } = scene.tissue.law;
-    assert_eq!((c1_kpa, c2_kpa, scene.tissue.kappa_kpa, scene.tissue.gauss), (0.5, 0.2, 10.0, 5));
+    assert_eq!(scene.tissue.law, LawSpec::MooneyRivlin { c1_kpa: 0.5, c2_kpa: 0.2 });
+    assert_eq!((scene.tissue.kappa_kpa, scene.tissue.gauss), (10.0, 5));
     assert_eq!(scene.muscles[0].fibres, FibresSpec::Uniform([36.0, 0.0, 0.0]));
     assert!(matches!(&scene.muscles[1].fibres, FibresSpec::Nodes(nodes) if nodes[7] == [8.0, 0.0, 0.5]));
     assert_eq!(scene.muscles[1].place.line, 21);
@@ -298,6 +298,18 @@ fn tables_the_task_does_not_use_are_warned_of() {
 }
 
 #[test]
+fn a_fit_under_a_pressure_is_warned_that_its_sensitivities_are_approximate() {
+    let text = WHOLE.replace(
+        "traction = { face = \"xi1=1\", kpa = [0, 0, -0.04] }",
+        "pressure = { face = \"xi1=1\", kpa = 0.04 }",
+    );
+    let codes =
+        |overrides: &[&str]| -> Vec<_> { parse(&text, overrides).unwrap().warnings.iter().map(|w| w.code).collect() };
+    assert_eq!(codes(&["fit.sensitivity=tangent"]), ["C020"]);
+    assert!(codes(&[]).is_empty());
+}
+
+#[test]
 fn overrides_are_merged_before_anything_is_checked() {
     let set = |overrides: &[&str]| parse(WHOLE, overrides).unwrap();
     assert_eq!(set(&["solver.step_max=0.02"]).solver.step_max, 0.02);
@@ -352,6 +364,111 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
     assert_eq!(lock, again.lock());
     for default in ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""] {
         assert!(lock.contains(default), "{default} is not in\n{lock}");
+    }
+}
+
+/// The laws, the regions and the loads that `WHOLE` does not have.
+const OTHERS: &str = r#"
+[task]
+kind = "forward"
+[mesh]
+block = { origin_mm = [0, 0, 0], size_mm = [10, 1, 1], elements = [10, 1, 1] }
+[tissue]
+guccione = { c_kpa = 2, bf = 8, bt = 2, bfs = 4, fibre = [1, 0, 0.5] }
+[[region]]
+name = "stiff"
+elements = [0, 3]
+guccione = { c_kpa = 20, bf = 8, bt = 2, bfs = 4, fibre = [0, 1, 0] }
+[[region]]
+name = "soft"
+box_mm = [[5, 0, 0], [10, 1, 1]]
+guccione = { c_kpa = 0.2, bf = 8, bt = 2, bfs = 4, fibre = [0, 1, 0] }
+[[support]]
+plate = { face = "xi1=1", offset_mm = 0.5 }
+[[load]]
+pressure = { face = "xi3=0", kpa = 0.004 }
+[[load]]
+nodal_force = { position_mm = [10, 0.5, 1], mn = [0, 0, -0.1] }
+[[load]]
+body_force = { mn_mm3 = [0, 0, -0.001] }
+[[load]]
+spring = { face = "xi1=0", kpa_per_mm = 0.5 }
+[[load]]
+spring = { face = "xi1=1", kpa_per_mm = 0.5, normal_only = true }
+[[attachment]]
+position_mm = [0, 0.5, 0.5]
+stiffness_mn_per_mm = 20
+"#;
+
+#[test]
+fn laws_regions_loads_and_attachments_are_read_and_locked() {
+    let scene = parse(OTHERS, &[]).unwrap();
+    let guccione = |c_kpa, fibre| LawSpec::Guccione { c_kpa, bf: 8.0, bt: 2.0, bfs: 4.0, fibre };
+    assert_eq!(scene.tissue.law, guccione(2.0, [1.0, 0.0, 0.5]));
+    assert_eq!(scene.regions[0].part, PartSpec::Elements(vec![0, 3]));
+    assert_eq!(scene.regions[1].part, PartSpec::Box([[5.0, 0.0, 0.0], [10.0, 1.0, 1.0]]));
+    assert_eq!(scene.regions[1].law, guccione(0.2, [0.0, 1.0, 0.0]));
+    assert!(matches!(scene.supports[0].kind, SupportKind::Plate { offset_mm: 0.5, .. }));
+    assert!(matches!(scene.loads[0].kind, LoadKind::Pressure { kpa: 0.004, .. }));
+    assert!(matches!(scene.loads[1].kind, LoadKind::NodalForce { mn: [0.0, 0.0, -0.1], .. }));
+    assert!(matches!(scene.loads[2].kind, LoadKind::BodyForce { mn_mm3: [0.0, 0.0, -0.001] }));
+    assert!(matches!(scene.loads[3].kind, LoadKind::Spring { kpa_per_mm: 0.5, normal_only: false, .. }));
+    assert!(matches!(scene.loads[4].kind, LoadKind::Spring { normal_only: true, .. }));
+    assert_eq!(scene.attachments[0].stiffness_mn_per_mm, 20.0);
+    // springs hold the body
+    let without_plate = OTHERS.replace("[[support]]\nplate = { face = \"xi1=1\", offset_mm = 0.5 }\n", "");
+    assert!(parse(&without_plate, &[]).unwrap().warnings.is_empty());
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!((content(&scene), scene.lock()), (content(&again), again.lock()));
+    // the law of a whole file in one line
+    let tissue = |law: &str| {
+        parse(WHOLE, &[]).and(parse(&WHOLE.replace("mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", law), &[]))
+    };
+    assert_eq!(tissue("neo-hookean = { mu_kpa = 1.4 }").unwrap().tissue.law, LawSpec::NeoHookean { mu_kpa: 1.4 });
+    for (from, to, code, told) in [
+        ("guccione = { c_kpa = 20", "neo-hookean = { mu_kpa = 20", "C002", "it can hold: name"),
+        ("fibre = [1, 0, 0.5]", "fibre = [0, 0, 0]", "C005", "a direction, not all 0"),
+        ("elements = [0, 3]", "elements = []", "C007", "at least one element"),
+        ("elements = [0, 3]", "elements = [-1]", "C005", "a whole number from 0"),
+        ("elements = [0, 3]", "", "C011", "`elements`, `box_mm`"),
+        ("[[5, 0, 0], [10, 1, 1]]", "[[5, 0, 0]]", "C007", "the lower and the upper one"),
+        ("\"soft\"", "\"stiff\"", "C008", "a second region"),
+        ("bfs = 4, fibre = [1", "bfs = 0, fibre = [1", "C005", "greater than 0"),
+        ("stiffness_mn_per_mm = 20", "stiffness_mn_per_mm = -20", "C005", "-20 mN/mm is not allowed"),
+        ("mn = [0, 0, -0.1]", "mn = [0, 0]", "C007", "needs 3"),
+    ] {
+        assert!(OTHERS.contains(from), "{from}");
+        let error = parse(&OTHERS.replacen(from, to, 1), &[]).expect_err(to);
+        let rendered = render_error(&error, false);
+        assert!(error.mistakes().iter().any(|m| m.code() == code) && rendered.contains(told), "{to}: {rendered}");
+    }
+}
+
+/// What only the geometry can tell: points outside, elements that are not there or claimed twice.
+#[test]
+fn regions_and_points_must_lie_in_the_host() {
+    for (from, to, code, told) in [
+        ("elements = [0, 3]", "elements = [0, 10]", "G021", "names element 10, but the host has 10"),
+        ("elements = [0, 3]", "elements = [0, 6]", "G021", "and region `stiff` both hold element 6"),
+        ("[[5, 0, 0], [10, 1, 1]]", "[[10, 0, 0], [5, 1, 1]]", "G021", "holds the centre of no element"),
+        (
+            "position_mm = [10, 0.5, 1]",
+            "position_mm = [10, 0.5, 2]",
+            "G020",
+            "the force lies outside the host, 1.000 mm",
+        ),
+        (
+            "position_mm = [0, 0.5, 0.5]",
+            "position_mm = [-2, 0.5, 0.5]",
+            "G020",
+            "position_mm = [0.000, 0.500, 0.500]",
+        ),
+    ] {
+        let scene = parse(&OTHERS.replacen(from, to, 1), &[]).unwrap();
+        let error = risorius::model::build::build(&scene).err().expect(to);
+        let rendered = render_error(&error, false);
+        assert_eq!((error.mistakes().len(), error.mistakes()[0].code()), (1, code), "{rendered}");
+        assert!(rendered.contains(told), "{told} is not told:\n{rendered}");
     }
 }
 

@@ -8,17 +8,18 @@ use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;
 use risorius::math::tensor::{Matrix, Vector, apply};
-use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
 use risorius::mesh::location::Locator;
 use risorius::mesh::map::{ElementMap, Term as MapTerm};
+use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
-use risorius::term::load::{gravity, traction};
+use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use risorius::term::muscle::Muscle;
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
+use risorius::term::spring::{Resists, Springs};
 use risorius::term::tissue::Tissue;
 use risorius::term::{Term, Want};
 
@@ -70,7 +71,21 @@ fn cases() -> Vec<(String, Model)> {
     single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
     single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
     single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
+    single("body force", &|mesh| Box::new(body_force(mesh, [0.01, 0.0, -0.02], 4)));
+    let at = MaterialPoint { element: 2, xi: [0.3, 1.0, 0.8] };
+    single("nodal force", &|mesh| Box::new(nodal_force(mesh, at, [4.0, -3.0, 2.0])));
+    single("springs", &|mesh| Box::new(Springs::foundation(mesh, &mesh.named_faces["xi3=0"], 0.3, Resists::All, 4)));
+    single("springs along the normal", &|mesh| {
+        Box::new(Springs::foundation(mesh, &mesh.named_faces["xi1=0"], 0.3, Resists::Normal, 4))
+    });
+    single("attachment", &|mesh| Box::new(Springs::attachment(mesh, at, 12.0)));
+    // a pressure has an energy where its surface is closed
+    single("pressure", &|mesh| Box::new(FollowerPressure::new(mesh, &whole_surface(mesh), 0.3, 6)));
     all
+}
+
+fn whole_surface(mesh: &Mesh) -> Vec<risorius::mesh::face::Face> {
+    mesh.named_faces.values().flatten().copied().collect()
 }
 
 /// A state in which det F stays well above zero: a stretch and a shear with random wiggles, random pressures.
@@ -157,11 +172,11 @@ fn forces_are_slopes_of_the_energy() {
 fn stiffness_is_the_slope_of_the_forces() {
     for (name, model) in cases() {
         let state = random_state(&model, 33);
-        let is_load = model.terms().iter().all(|t| t.is_load());
+        let is_dead = model.terms().iter().all(|t| t.is_load() && t.name() != "pressure");
         for v in directions(&model, 34) {
             let ours = tangent_times(&model, &state, &v);
             let differences = slope(|h| evaluate(&model, &moved(&model, &state, &v, h)).residual, 1e-3);
-            if is_load {
+            if is_dead {
                 assert!(
                     ours.iter().chain(&differences).all(|k| k.abs() < 1e-9),
                     "{name}: a dead load has no stiffness"
@@ -190,20 +205,22 @@ fn controls_and_loads_have_their_forces() {
         }
         if model.terms()[0].is_load() {
             assert_close(&name, &by_load, &found_load, 1e-12);
-            // the work of a dead load is minus its energy
+            // the work of a dead load is minus its energy; what a pressure works depends on the way
             let work = model.external_work(&state);
-            assert_close(&name, &[-energy(&model, &state)], &[work], 1e-13);
+            let expected = if name == "pressure" { 0.0 } else { -energy(&model, &state) };
+            assert!((work - expected).abs() <= 1e-13 * expected.abs(), "{name}: {work} instead of {expected}");
         } else {
             assert!(by_load.iter().chain(&found_load).all(|f| *f == 0.0), "{name}: depends on the load");
         }
     }
 }
 
-/// x -> R x + t leaves the energies of tissue and muscle alone and turns their forces.
+/// x -> R x + t leaves the energies of tissue, muscle and enclosed pressure alone and turns their forces.
 #[test]
 fn rigid_motion_costs_nothing() {
     let mut random = Random::new(36);
-    for (name, model) in cases().into_iter().filter(|(_, model)| !model.terms()[0].is_load()) {
+    let free = |name: &str| name.starts_with("tissue") || name.starts_with("muscle") || name == "pressure";
+    for (name, model) in cases().into_iter().filter(|(name, _)| free(name)) {
         let state = random_state(&model, 37);
         let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
         let mut turned = state.clone();
@@ -238,6 +255,29 @@ fn rest_is_an_equilibrium() {
         let force = tangent_times(&model, &model.rest(), &v);
         assert!(common::largest(&force) < 1e-11 * scale, "{name}: {:.1e}", common::largest(&force));
     }
+}
+
+/// Under a face with a free rim a pressure has no energy, and its tangent is the symmetric part of the slope of its force.
+#[test]
+fn the_tangent_of_a_pressure_is_symmetrised_at_a_free_rim() {
+    let mesh = host();
+    let faces = mesh.named_faces["xi3=1"].clone();
+    let terms: Vec<Box<dyn Term>> = vec![Box::new(FollowerPressure::new(&mesh, &faces, 0.3, 6))];
+    let model = model(mesh, &pressure::Trilinear, terms, Vec::new());
+    let state = random_state(&model, 38);
+    let all = directions(&model, 39);
+    let along = |v: &[f64]| slope(|h| evaluate(&model, &moved(&model, &state, v, h)).residual, 1e-3);
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut asymmetry: f64 = 0.0;
+    for (v, w) in all[..2].iter().zip(&all[4..]) {
+        let (vkw, wkv) = (dot(v, &along(w)), dot(w, &along(v)));
+        let ours = dot(v, &tangent_times(&model, &state, w));
+        let size = vkw.abs().max(wkv.abs());
+        assert!((ours - 0.5 * (vkw + wkv)).abs() < 1e-7 * size, "{ours} instead of ({vkw} + {wkv})/2");
+        asymmetry = asymmetry.max((vkw - wkv).abs() / size);
+    }
+    // there is something to symmetrise
+    assert!(asymmetry > 0.1, "{asymmetry}");
 }
 
 /// A mesh whose node 1 hangs between its nodes 0 and 2: its parameters are sums over theirs, so the mesh has none

@@ -454,11 +454,37 @@ pub enum Error {
         place: Box<Place>,
     },
     /// A symmetry support on a face that is not normal to an axis.
-    #[error("face `{face}` does not lie in a plane normal to a coordinate axis, so it cannot be a symmetry plane")]
+    #[error(
+        "face `{face}` does not lie in a plane normal to a coordinate axis, so it can be neither a symmetry plane nor a plate"
+    )]
     NotNormalToAxis {
         /// The face.
         face: Box<str>,
         /// The support in the problem file.
+        place: Box<Place>,
+    },
+    /// A force or an attachment acts on a point outside the host.
+    #[error("the point of {what} lies outside the host, {distance:.3} mm from its nearest point ({:.3}, {:.3}, {:.3}) mm", nearest[0], nearest[1], nearest[2])]
+    PointOutside {
+        /// What acts there.
+        what: &'static str,
+        /// Distance to the host, mm.
+        distance: f64,
+        /// The nearest point, mm.
+        nearest: [f64; 3],
+        /// The table in the problem file.
+        place: Box<Place>,
+    },
+    /// A region that is no set of elements of the host, or shares one with another.
+    #[error("region `{region}` {problem}")]
+    BadRegion {
+        /// Its name.
+        region: Box<str>,
+        /// What is wrong with it.
+        problem: Box<str>,
+        /// What to do.
+        help: &'static str,
+        /// The region in the problem file.
         place: Box<Place>,
     },
     // ---- S: solver ------------------------------------------------------------------------------------
@@ -639,6 +665,8 @@ impl Error {
             Error::ProbeOutside { .. } => "G004",
             Error::SupportsDisagree { .. } => "G005",
             Error::NotNormalToAxis { .. } => "G006",
+            Error::PointOutside { .. } => "G020",
+            Error::BadRegion { .. } => "G021",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
@@ -724,7 +752,7 @@ impl Error {
             Error::InvertedMesh { .. } => Some("check sizes and the order of nodes: sizes must be positive".into()),
             Error::MuscleOutside(_) => Some("move or shrink the muscle until it lies inside the host".into()),
             Error::InvertedMuscle { .. } => Some("check the muscle's size and the order of its nodes".into()),
-            Error::ProbeOutside { nearest, .. } => Some(format!(
+            Error::ProbeOutside { nearest, .. } | Error::PointOutside { nearest, .. } => Some(format!(
                 "the nearest material point is position_mm = [{:.3}, {:.3}, {:.3}]",
                 nearest[0], nearest[1], nearest[2]
             )),
@@ -732,6 +760,7 @@ impl Error {
             Error::NotNormalToAxis { .. } => {
                 Some("turn the geometry so that the plane is normal to x, y or z".into())
             }
+            Error::BadRegion { help, .. } => Some((*help).into()),
             Error::StepNotSolved { .. } => {
                 Some("scale the problem: give realistic sd_mm, and remove unknowns that no marker sees".into())
             }
@@ -783,6 +812,8 @@ impl Error {
             | Error::ProbeOutside { place, .. }
             | Error::SupportsDisagree { place, .. }
             | Error::NotNormalToAxis { place, .. }
+            | Error::PointOutside { place, .. }
+            | Error::BadRegion { place, .. }
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }

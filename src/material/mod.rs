@@ -4,11 +4,15 @@
 //! conformance tests of `tests/laws.rs` then run on it.
 
 pub mod fibre;
+pub mod guccione;
 pub mod mooney_rivlin;
+pub mod neo_hookean;
 
 use crate::math::lanes::{Lanes, MatrixLanes};
 
+pub use guccione::Guccione;
 pub use mooney_rivlin::MooneyRivlin;
+pub use neo_hookean::NeoHookean;
 
 /// The pairs (i, k) of spatial components for which a tangent is stored; the others follow by symmetry.
 pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -35,6 +39,6 @@ pub trait Law: Send + Sync {
     /// psi(F), P(F), A(F) at eight points. F must have det F > 0; elsewhere the result is meaningless but finite or NaN.
     fn response(&self, f: &MatrixLanes) -> Response;
 
-    /// A modulus for scaling (kPa): the shear modulus at rest.
+    /// A modulus for scaling (kPa): the shear modulus at rest, of a shear along the fibres where there are any.
     fn shear_modulus(&self) -> f64;
 }

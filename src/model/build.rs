@@ -1,10 +1,10 @@
 //! From a scene to a model: every table of the problem file becomes a mesh, a term or a support.
 
 use super::supports::{Conflict, Support, Supports, normal_axis};
+use super::tissue::{Host, tissue};
 use super::{Control, Ingredients, Model};
 use crate::error::{Error, MuscleOutside, Place, Result, Warning};
 use crate::material::fibre::Blemker;
-use crate::material::{Law, MooneyRivlin};
 use crate::math::tensor::{norm, normalised};
 use crate::mesh::block::block;
 use crate::mesh::element::{TricubicHermite, Trilinear};
@@ -13,13 +13,13 @@ use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    BlockSpec, ElementSpec, FaceSpec, FibresSpec, LawSpec, LoadKind, MuscleSpec, PressureSpec, Scene, SupportKind,
+    BlockSpec, ElementSpec, FaceSpec, FibresSpec, LoadKind, MuscleSpec, PressureSpec, Scene, SupportKind,
 };
 use crate::term::Term;
-use crate::term::load::{gravity, traction};
+use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use crate::term::muscle::{Muscle, NotEmbedded};
 use crate::term::pressure::{self, PressureSpace};
-use crate::term::tissue::Tissue;
+use crate::term::spring::{Resists, Springs};
 
 /// A model built from a scene, with the places in it that the scene names.
 pub struct Built {
@@ -38,7 +38,8 @@ const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
 ///
 /// # Errors
 /// All geometric mistakes of the scene at once, each with its place: inverted elements, muscles or probes outside the
-/// host, supports that contradict each other.
+/// host, supports that contradict each other, points of loads outside,
+/// regions that are none.
 pub fn build(scene: &Scene) -> Result<Built> {
     let mesh = host(scene);
     let space: &'static dyn PressureSpace = match scene.tissue.pressure {
@@ -46,21 +47,12 @@ pub fn build(scene: &Scene) -> Result<Built> {
         PressureSpec::DiscontinuousTrilinear => &pressure::DiscontinuousTrilinear,
     };
     let gauss = scene.tissue.gauss;
-    let LawSpec::MooneyRivlin { c1_kpa, c2_kpa } = scene.tissue.law;
-    let law = MooneyRivlin { c1: c1_kpa, c2: c2_kpa };
-    let shear_modulus = law.shear_modulus();
     // nothing else can be placed in a host that is inverted
-    let tissue = Tissue::new(&mesh, law, scene.tissue.kappa_kpa, space, gauss).map_err(|at| Error::InvertedMesh {
-        element: at.element,
-        xi: at.xi,
-        det: at.det,
-        place: Box::new(scene.mesh.place.clone()),
-    })?;
-    let volume = tissue.volume();
+    let Host { term: tissue, volume, shear_modulus } = tissue(scene, &mesh, space)?;
 
     let mut mistakes = Vec::new();
     let mut warnings = Vec::new();
-    let mut terms: Vec<Box<dyn Term>> = vec![Box::new(tissue)];
+    let mut terms: Vec<Box<dyn Term>> = vec![tissue];
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
     for (index, spec) in scene.muscles.iter().enumerate() {
@@ -79,13 +71,42 @@ pub fn build(scene: &Scene) -> Result<Built> {
             onset: if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 },
         });
     }
+    let point = |position: [f64; 3], what: &'static str, place: &Place| {
+        locator.locate(position).map_err(|outside| Error::PointOutside {
+            what,
+            distance: outside.distance,
+            nearest: mesh.position(outside.nearest),
+            place: Box::new(place.clone()),
+        })
+    };
     for load in &scene.loads {
         terms.push(match &load.kind {
             LoadKind::Traction { face, kpa } => Box::new(traction(&mesh, faces(&mesh, face), *kpa, gauss)),
             LoadKind::Gravity { density_kg_m3, acceleration_m_s2 } => {
                 Box::new(gravity(&mesh, *density_kg_m3, *acceleration_m_s2, gauss))
             }
+            LoadKind::BodyForce { mn_mm3 } => Box::new(body_force(&mesh, *mn_mm3, gauss)),
+            LoadKind::Pressure { face, kpa } => {
+                Box::new(FollowerPressure::new(&mesh, faces(&mesh, face), *kpa, gauss))
+            }
+            LoadKind::NodalForce { position_mm, mn } => match point(*position_mm, "the force", &load.place) {
+                Ok(at) => Box::new(nodal_force(&mesh, at, *mn)),
+                Err(error) => {
+                    mistakes.push(error);
+                    continue;
+                }
+            },
+            LoadKind::Spring { face, kpa_per_mm, normal_only } => {
+                let resists = if *normal_only { Resists::Normal } else { Resists::All };
+                Box::new(Springs::foundation(&mesh, faces(&mesh, face), *kpa_per_mm, resists, gauss))
+            }
         });
+    }
+    for attachment in &scene.attachments {
+        match point(attachment.position_mm, "the attachment", &attachment.place) {
+            Ok(at) => terms.push(Box::new(Springs::attachment(&mesh, at, attachment.stiffness_mn_per_mm))),
+            Err(error) => mistakes.push(error),
+        }
     }
     let mut probes = Vec::new();
     for probe in &scene.probes {
@@ -186,20 +207,22 @@ fn coarse_rule(spec: &MuscleSpec, host: &BlockSpec) -> Option<Warning> {
 }
 
 fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
+    let plane = |face: &FaceSpec, place: &Place| {
+        normal_axis(mesh, faces(mesh, face))
+            .ok_or_else(|| Error::NotNormalToAxis { face: face.to_string().into(), place: Box::new(place.clone()) })
+    };
     let mut all = Vec::new();
     for spec in &scene.supports {
         all.push(match &spec.kind {
             SupportKind::Clamp { face } => Support::Clamp { faces: faces(mesh, face).to_vec() },
             SupportKind::Symmetry { face } => {
-                let faces = faces(mesh, face).to_vec();
-                let Some(axis) = normal_axis(mesh, &faces) else {
-                    return Err(Error::NotNormalToAxis {
-                        face: face.to_string().into(),
-                        place: Box::new(spec.place.clone()),
-                    });
-                };
-                Support::Symmetry { faces, axis }
+                Support::Symmetry { faces: faces(mesh, face).to_vec(), axis: plane(face, &spec.place)? }
             }
+            SupportKind::Plate { face, offset_mm } => Support::Plate {
+                faces: faces(mesh, face).to_vec(),
+                axis: plane(face, &spec.place)?,
+                offset: *offset_mm,
+            },
             SupportKind::Rotate { face, axis, through_mm, angle_deg } => {
                 debug_assert!(norm(*axis) > 0.0, "checked by the scene");
                 Support::Rotate {

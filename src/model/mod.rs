@@ -5,6 +5,7 @@ pub mod build;
 mod numbering;
 mod state;
 pub mod supports;
+mod tissue;
 
 pub use assembly::{Evaluation, Workspace, WorstPoint};
 pub use numbering::Numbering;

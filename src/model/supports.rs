@@ -23,6 +23,15 @@ pub enum Support {
         /// The axis, 0 to 2.
         axis: usize,
     },
+    /// The faces lie in a plane normal to an axis and stay in it while it moves: a smooth plate pulls or presses.
+    Plate {
+        /// The faces.
+        faces: Vec<Face>,
+        /// The axis, 0 to 2.
+        axis: usize,
+        /// Motion of the plane along the axis at full load, mm.
+        offset: f64,
+    },
     /// A rigid rotation about an axis, in proportion to the load factor.
     Rotate {
         /// The faces.
@@ -147,7 +156,7 @@ impl Support {
     fn reach(&self) -> (&[Face], std::ops::Range<usize>) {
         match self {
             Support::Clamp { faces } | Support::Rotate { faces, .. } | Support::Affine { faces, .. } => (faces, 0..3),
-            Support::Symmetry { faces, axis } => (faces, *axis..*axis + 1),
+            Support::Symmetry { faces, axis } | Support::Plate { faces, axis, .. } => (faces, *axis..*axis + 1),
         }
     }
 
@@ -156,6 +165,11 @@ impl Support {
     fn displacement(&self, mesh: &Mesh, parameter: usize, load: f64) -> Vector {
         match self {
             Support::Clamp { .. } | Support::Symmetry { .. } => [0.0; 3],
+            // of the component along the axis, the only one that is prescribed
+            Support::Plate { offset, .. } => {
+                let value = mesh.parameter_derivative[parameter] == 0;
+                [if value { load * offset } else { 0.0 }; 3]
+            }
             Support::Rotate { axis, through, angle, .. } => {
                 let r = rotation(*axis, load * angle);
                 let turn: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| r[i][j] - IDENTITY[i][j]));

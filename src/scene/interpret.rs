@@ -21,9 +21,12 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let tissue = file.required("tissue", "[tissue]\nmooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", |item| {
             item.table(tissue)
         });
+        let word = tissue.as_ref().map(|tissue| tissue.law.word());
+        let regions = file.tables("region", |table| region(table, word));
         let muscles = file.tables("muscle", muscle);
         let supports = file.tables("support", support);
         let loads = file.tables("load", load);
+        let attachments = file.tables("attachment", attachment);
         let controls = file.or("controls", Vec::new(), |item| references.controls(&item));
         let probes = file.tables("probe", probe);
         let fit = if fitting {
@@ -46,9 +49,11 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
             task: task?,
             mesh: mesh?,
             tissue: tissue?,
+            regions: regions?,
             muscles: muscles?,
             supports: supports?,
             loads: loads?,
+            attachments: attachments?,
             controls: controls?,
             probes: probes?,
             fit: fit?,
@@ -113,9 +118,7 @@ fn mesh(table: &mut Table) -> Option<MeshSpec> {
 }
 
 fn tissue(table: &mut Table) -> Option<TissueSpec> {
-    let law = table.required("mooney-rivlin", "mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", |item| {
-        item.table(mooney_rivlin)
-    });
+    let law = law(table, None);
     let pressures =
         [("trilinear", PressureSpec::Trilinear), ("discontinuous-trilinear", PressureSpec::DiscontinuousTrilinear)];
     let later = [("discontinuous-linear", "four pressures per element"), ("constant", "one pressure per element")];
@@ -123,6 +126,64 @@ fn tissue(table: &mut Table) -> Option<TissueSpec> {
     let kappa_kpa = table.or("kappa_kpa", 10.0, |item| item.number(NOT_NEGATIVE));
     let gauss = table.or("gauss", 5, |item| item.whole(3, 8));
     Some(TissueSpec { law: law?, pressure: pressure?, kappa_kpa: kappa_kpa?, gauss: gauss?, place: table.place() })
+}
+
+/// The law of a tissue: of all there are, or the one called `only` with other constants.
+fn law(table: &mut Table, only: Option<&str>) -> Option<LawSpec> {
+    let mooney_rivlin: Reader<LawSpec> = |item| item.table(mooney_rivlin);
+    let neo_hookean: Reader<LawSpec> = |item| item.table(neo_hookean);
+    let mut laws = vec![
+        ("mooney-rivlin", mooney_rivlin),
+        ("neo-hookean", neo_hookean),
+        ("guccione", |item| item.table(guccione)),
+    ];
+    laws.retain(|(word, _)| only.is_none_or(|only| only == *word));
+    table.one_of(&laws)
+}
+
+/// A part of the tissue: the law of the tissue, called `word`, with other constants.
+fn region(table: &mut Table, word: Option<&'static str>) -> Option<RegionSpec> {
+    let name = table.required("name", "name = \"lip\"", |item| item.name());
+    let elements: Reader<PartSpec> = |item| {
+        let elements = item.list("a list of indices of elements", |item| item.whole(0, 1_000_000_000))?;
+        if elements.is_empty() {
+            return item.wrong_length("no entry", "the index of at least one element");
+        }
+        Some(PartSpec::Elements(elements))
+    };
+    let corners: Reader<PartSpec> = |item| {
+        let corners = item.list("a list of 2 corners", |corner| corner.numbers(FINITE))?;
+        let count = corners.len();
+        match corners.try_into() {
+            Ok(corners) => Some(PartSpec::Box(corners)),
+            Err(_) => item.wrong_length(&format!("{count} corners"), "2, the lower and the upper one"),
+        }
+    };
+    let part = table.one_of(&[("elements", elements), ("box_mm", corners)]);
+    let law = law(table, word);
+    Some(RegionSpec { name: name?, part: part?, law: law?, place: table.place() })
+}
+
+fn neo_hookean(table: &mut Table) -> Option<LawSpec> {
+    let mu_kpa = table.required("mu_kpa", "mu_kpa = 1.4", |item| item.number(POSITIVE));
+    Some(LawSpec::NeoHookean { mu_kpa: mu_kpa? })
+}
+
+fn guccione(table: &mut Table) -> Option<LawSpec> {
+    let c_kpa = table.required("c_kpa", "c_kpa = 2", |item| item.number(POSITIVE));
+    let bf = table.required("bf", "bf = 8", |item| item.number(POSITIVE));
+    let bt = table.required("bt", "bt = 2", |item| item.number(POSITIVE));
+    let bfs = table.required("bfs", "bfs = 4", |item| item.number(POSITIVE));
+    let fibre = table.required("fibre", "fibre = [1, 0, 0]", direction);
+    Some(LawSpec::Guccione { c_kpa: c_kpa?, bf: bf?, bt: bt?, bfs: bfs?, fibre: fibre? })
+}
+
+/// A vector that is not zero.
+fn direction(item: Item) -> Option<[f64; 3]> {
+    match item.numbers(FINITE)? {
+        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
+        direction => Some(direction),
+    }
 }
 
 fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
@@ -203,16 +264,24 @@ fn blemker(table: &mut Table) -> Option<BlemkerSpec> {
 fn support(table: &mut Table) -> Option<SupportSpec> {
     let clamp: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Clamp { face: face(table)? }));
     let symmetry: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Symmetry { face: face(table)? }));
-    let kind = table.one_of(&[("clamp", clamp), ("symmetry", symmetry), ("rotate", |item| item.table(rotate))]);
+    let kind = table.one_of(&[
+        ("clamp", clamp),
+        ("symmetry", symmetry),
+        ("plate", |item| item.table(plate)),
+        ("rotate", |item| item.table(rotate)),
+    ]);
     Some(SupportSpec { kind: kind?, place: table.place() })
+}
+
+fn plate(table: &mut Table) -> Option<SupportKind> {
+    let face = face(table);
+    let offset_mm = table.required("offset_mm", "offset_mm = 2", |item| item.number(FINITE));
+    Some(SupportKind::Plate { face: face?, offset_mm: offset_mm? })
 }
 
 fn rotate(table: &mut Table) -> Option<SupportKind> {
     let face = face(table);
-    let axis = table.required("axis", "axis = [1, 0, 0]", |item| match item.numbers(FINITE)? {
-        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
-        axis => Some(axis),
-    });
+    let axis = table.required("axis", "axis = [1, 0, 0]", direction);
     let through_mm = table.required("through_mm", "through_mm = [0, 5, 5]", |item| item.numbers(FINITE));
     let angle_deg = table.required("angle_deg", "angle_deg = 90", |item| item.number(FINITE));
     Some(SupportKind::Rotate { face: face?, axis: axis?, through_mm: through_mm?, angle_deg: angle_deg? })
@@ -228,8 +297,46 @@ fn face(table: &mut Table) -> Option<FaceSpec> {
 
 fn load(table: &mut Table) -> Option<LoadSpec> {
     let traction: Reader<LoadKind> = |item| item.table(traction);
-    let kind = table.one_of(&[("traction", traction), ("gravity", |item| item.table(gravity))]);
+    let kind = table.one_of(&[
+        ("traction", traction),
+        ("gravity", |item| item.table(gravity)),
+        ("body_force", |item| item.table(body_force)),
+        ("pressure", |item| item.table(pressure)),
+        ("nodal_force", |item| item.table(nodal_force)),
+        ("spring", |item| item.table(spring)),
+    ]);
     Some(LoadSpec { kind: kind?, place: table.place() })
+}
+
+fn body_force(table: &mut Table) -> Option<LoadKind> {
+    let mn_mm3 = table.required("mn_mm3", "mn_mm3 = [0, 0, -0.01]", |item| item.numbers(FINITE));
+    Some(LoadKind::BodyForce { mn_mm3: mn_mm3? })
+}
+
+fn pressure(table: &mut Table) -> Option<LoadKind> {
+    let face = face(table);
+    let kpa = table.required("kpa", "kpa = 0.04", |item| item.number(FINITE));
+    Some(LoadKind::Pressure { face: face?, kpa: kpa? })
+}
+
+fn nodal_force(table: &mut Table) -> Option<LoadKind> {
+    let position_mm = table.required("position_mm", "position_mm = [60, 20, 20]", |item| item.numbers(FINITE));
+    let mn = table.required("mn", "mn = [0, 0, -5]", |item| item.numbers(FINITE));
+    Some(LoadKind::NodalForce { position_mm: position_mm?, mn: mn? })
+}
+
+fn spring(table: &mut Table) -> Option<LoadKind> {
+    let face = face(table);
+    let kpa_per_mm = table.required("kpa_per_mm", "kpa_per_mm = 0.5", |item| item.number(NOT_NEGATIVE));
+    let normal_only = table.or("normal_only", false, |item| item.flag());
+    Some(LoadKind::Spring { face: face?, kpa_per_mm: kpa_per_mm?, normal_only: normal_only? })
+}
+
+fn attachment(table: &mut Table) -> Option<AttachmentSpec> {
+    let position_mm = table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE));
+    let stiffness =
+        table.required("stiffness_mn_per_mm", "stiffness_mn_per_mm = 20", |item| item.number(NOT_NEGATIVE));
+    Some(AttachmentSpec { position_mm: position_mm?, stiffness_mn_per_mm: stiffness?, place: table.place() })
 }
 
 fn traction(table: &mut Table) -> Option<LoadKind> {

@@ -42,9 +42,11 @@ impl Scene {
             task,
             mesh: MeshSpec { block: mesh, place: _ },
             tissue,
+            regions,
             muscles,
             supports,
             loads,
+            attachments,
             controls,
             probes,
             fit,
@@ -62,9 +64,14 @@ impl Scene {
             format!("block = {}", block(mesh)),
         ];
         tissue_lines(tissue, &mut lines);
+        regions.iter().for_each(|region| region_lines(region, &mut lines));
         muscles.iter().for_each(|muscle| muscle_lines(muscle, &mut lines));
         supports.iter().for_each(|support| lines.extend(["\n[[support]]".into(), support_line(&support.kind)]));
         loads.iter().for_each(|load| lines.extend(["\n[[load]]".into(), load_line(&load.kind)]));
+        for AttachmentSpec { position_mm, stiffness_mn_per_mm, place: _ } in attachments {
+            lines.extend(["\n[[attachment]]".into(), format!("position_mm = {}", numbers(position_mm))]);
+            lines.push(format!("stiffness_mn_per_mm = {}", number(*stiffness_mn_per_mm)));
+        }
         if !controls.is_empty() {
             lines.push("\n[controls]".into());
             lines.extend(controls.iter().map(control_line));
@@ -104,17 +111,47 @@ fn block(block: &BlockSpec) -> String {
 
 fn tissue_lines(tissue: &TissueSpec, lines: &mut Vec<String>) {
     let TissueSpec { law, pressure, kappa_kpa, gauss, place: _ } = tissue;
-    let LawSpec::MooneyRivlin { c1_kpa, c2_kpa } = law;
     let pressure = match pressure {
         PressureSpec::Trilinear => "trilinear",
         PressureSpec::DiscontinuousTrilinear => "discontinuous-trilinear",
     };
     lines.extend([
         "\n[tissue]".into(),
-        format!("mooney-rivlin = {{ c1_kpa = {}, c2_kpa = {} }}", number(*c1_kpa), number(*c2_kpa)),
+        law_line(law),
         format!("pressure = \"{pressure}\""),
         format!("kappa_kpa = {}", number(*kappa_kpa)),
         format!("gauss = {gauss}"),
+    ]);
+}
+
+fn law_line(law: &LawSpec) -> String {
+    let constants = match law {
+        LawSpec::MooneyRivlin { c1_kpa, c2_kpa } => {
+            format!("c1_kpa = {}, c2_kpa = {}", number(*c1_kpa), number(*c2_kpa))
+        }
+        LawSpec::NeoHookean { mu_kpa } => format!("mu_kpa = {}", number(*mu_kpa)),
+        LawSpec::Guccione { c_kpa, bf, bt, bfs, fibre } => format!(
+            "c_kpa = {}, bf = {}, bt = {}, bfs = {}, fibre = {}",
+            number(*c_kpa),
+            number(*bf),
+            number(*bt),
+            number(*bfs),
+            numbers(fibre)
+        ),
+    };
+    format!("{} = {{ {constants} }}", law.word())
+}
+
+fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
+    let RegionSpec { name, part, law, place: _ } = region;
+    lines.extend([
+        "\n[[region]]".into(),
+        format!("name = {}", text(name)),
+        match part {
+            PartSpec::Elements(elements) => format!("elements = {elements:?}"),
+            PartSpec::Box([lower, upper]) => format!("box_mm = [{}, {}]", numbers(lower), numbers(upper)),
+        },
+        law_line(law),
     ]);
 }
 
@@ -151,6 +188,9 @@ fn support_line(kind: &SupportKind) -> String {
     match kind {
         SupportKind::Clamp { face } => format!("clamp = {{ face = \"{face}\" }}"),
         SupportKind::Symmetry { face } => format!("symmetry = {{ face = \"{face}\" }}"),
+        SupportKind::Plate { face, offset_mm } => {
+            format!("plate = {{ face = \"{face}\", offset_mm = {} }}", number(*offset_mm))
+        }
         SupportKind::Rotate { face, axis, through_mm, angle_deg } => format!(
             "rotate = {{ face = \"{face}\", axis = {}, through_mm = {}, angle_deg = {} }}",
             numbers(axis),
@@ -167,6 +207,15 @@ fn load_line(kind: &LoadKind) -> String {
             "gravity = {{ density_kg_m3 = {}, acceleration_m_s2 = {} }}",
             number(*density_kg_m3),
             numbers(acceleration_m_s2)
+        ),
+        LoadKind::BodyForce { mn_mm3 } => format!("body_force = {{ mn_mm3 = {} }}", numbers(mn_mm3)),
+        LoadKind::Pressure { face, kpa } => format!("pressure = {{ face = \"{face}\", kpa = {} }}", number(*kpa)),
+        LoadKind::NodalForce { position_mm, mn } => {
+            format!("nodal_force = {{ position_mm = {}, mn = {} }}", numbers(position_mm), numbers(mn))
+        }
+        LoadKind::Spring { face, kpa_per_mm, normal_only } => format!(
+            "spring = {{ face = \"{face}\", kpa_per_mm = {}, normal_only = {normal_only} }}",
+            number(*kpa_per_mm)
         ),
     }
 }

@@ -44,12 +44,16 @@ pub struct Scene {
     pub mesh: MeshSpec,
     /// Its passive tissue.
     pub tissue: TissueSpec,
+    /// Parts of the tissue with other constants.
+    pub regions: Vec<RegionSpec>,
     /// The muscles in it.
     pub muscles: Vec<MuscleSpec>,
     /// What holds or moves its surface.
     pub supports: Vec<SupportSpec>,
     /// The forces on it.
     pub loads: Vec<LoadSpec>,
+    /// Points of it that springs hold.
+    pub attachments: Vec<AttachmentSpec>,
     /// Activations, in the order of the file; a muscle without one rests at 0.
     pub controls: Vec<ControlSpec>,
     /// Points whose motion is written down.
@@ -123,7 +127,7 @@ fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], o
         }
         flatten_controls(&mut root);
     }
-    for kind in ["muscle", "probe", "marker"] {
+    for kind in ["muscle", "region", "probe", "marker"] {
         unique_names(&root, kind, &mistakes);
     }
     let references = References::new(&root, &folder, on_disk);
@@ -171,11 +175,24 @@ fn warnings(scene: &Scene, file: &Arc<str>) -> Vec<Warning> {
         }
         (None, _) => {}
     }
+    let pressure = scene.loads.iter().find(|load| matches!(load.kind, LoadKind::Pressure { .. }));
+    if let (Some(fit), Task::Fit, Some(load)) = (&scene.fit, scene.task, pressure)
+        && fit.sensitivity == SensitivitySpec::Tangent
+    {
+        warnings.push(Warning {
+            code: "C020",
+            message: "under a pressure on a face with a free rim, sensitivities from the tangent are approximate"
+                .into(),
+            place: Some(load.place.clone()),
+            help: Some("write sensitivity = \"finite-difference\" in [fit] if the fit is slow or stalls".into()),
+        });
+    }
     if let (Some(marker), Task::Forward) = (scene.markers.first(), scene.task) {
         let help = "write a [[probe]] to follow a point of the body".into();
         warnings.push(unused("`marker`".into(), &marker.place, help));
     }
-    if scene.supports.is_empty() {
+    let springs = scene.loads.iter().any(|load| matches!(load.kind, LoadKind::Spring { .. }));
+    if scene.supports.is_empty() && scene.attachments.is_empty() && !springs {
         warnings.push(Warning {
             code: "C016",
             message: "nothing holds the body: there is no [[support]]".into(),

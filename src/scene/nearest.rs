@@ -1,8 +1,18 @@
 //! "Did you mean": the known word nearest to a mistaken one, and the units that keys end with.
 
 /// The endings of keys and the units they stand for.
-const UNITS: [(&str, &str); 6] =
-    [("_mm", "mm"), ("_kpa", "kPa"), ("_deg", "degrees"), ("_kg_m3", "kg/m3"), ("_m_s2", "m/s2"), ("_s", "s")];
+const UNITS: [(&str, &str); 10] = [
+    ("_mn_per_mm", "mN/mm"),
+    ("_kpa_per_mm", "kPa/mm"),
+    ("_mn_mm3", "mN/mm3"),
+    ("_mn", "mN"),
+    ("_mm", "mm"),
+    ("_kpa", "kPa"),
+    ("_deg", "degrees"),
+    ("_kg_m3", "kg/m3"),
+    ("_m_s2", "m/s2"),
+    ("_s", "s"),
+];
 
 /// Endings that people write for other units.
 const FOREIGN: [&str; 8] = ["_m", "_cm", "_pa", "_mpa", "_rad", "_g_cm3", "_mm_s2", "_ms"];

@@ -62,8 +62,32 @@ pub struct TissueSpec {
     pub place: Place,
 }
 
+/// A part of the tissue with constants of its own: `[[region]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct RegionSpec {
+    /// Its name, unique among regions.
+    pub name: String,
+    /// The elements in it.
+    pub part: PartSpec,
+    /// The law of the tissue with other constants.
+    pub law: LawSpec,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A set of elements of the host.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PartSpec {
+    /// `elements`: their indices, counted from 0; at least one.
+    Elements(Vec<usize>),
+    /// `box_mm`: those whose centre lies between the lower and the upper corner before anything moves, mm.
+    Box([[f64; 3]; 2]),
+}
+
 /// A material law with its constants.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LawSpec {
     /// psi = c1 (I1 - 3) + c2 (I2 - 3), invariants of the isochoric part.
@@ -73,6 +97,35 @@ pub enum LawSpec {
         /// c2, kPa, not negative.
         c2_kpa: f64,
     },
+    /// psi = mu/2 (I1 - 3), invariant of the isochoric part.
+    NeoHookean {
+        /// The shear modulus, kPa.
+        mu_kpa: f64,
+    },
+    /// psi = c/2 (exp Q - 1), Q a sum of squares of the strains in the axes of the fibres.
+    Guccione {
+        /// The scale of the stress, kPa.
+        c_kpa: f64,
+        /// The exponent along the fibres.
+        bf: f64,
+        /// The exponent across them.
+        bt: f64,
+        /// The exponent of shear along them.
+        bfs: f64,
+        /// The direction of the fibres; any length but 0.
+        fibre: [f64; 3],
+    },
+}
+
+impl LawSpec {
+    /// The key in the problem file.
+    pub fn word(&self) -> &'static str {
+        match self {
+            LawSpec::MooneyRivlin { .. } => "mooney-rivlin",
+            LawSpec::NeoHookean { .. } => "neo-hookean",
+            LawSpec::Guccione { .. } => "guccione",
+        }
+    }
 }
 
 /// A space of pressures: `[tissue] pressure`.
@@ -162,6 +215,13 @@ pub enum SupportKind {
         /// The face.
         face: FaceSpec,
     },
+    /// The face, normal to an axis, moves along it as a smooth plate does that pulls or presses it.
+    Plate {
+        /// The face.
+        face: FaceSpec,
+        /// The motion along the axis at full load, mm.
+        offset_mm: f64,
+    },
     /// The face turns as a rigid plate.
     Rotate {
         /// The face.
@@ -207,7 +267,7 @@ pub struct LoadSpec {
 
 /// The kinds of load.
 #[derive(Debug, Clone, Copy, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[serde(rename_all = "snake_case")]
 pub enum LoadKind {
     /// A dead force per reference area of a face.
     Traction {
@@ -223,6 +283,46 @@ pub enum LoadKind {
         /// Acceleration, m/s2.
         acceleration_m_s2: [f64; 3],
     },
+    /// A dead force per reference volume on the whole body.
+    BodyForce {
+        /// mN/mm3.
+        mn_mm3: [f64; 3],
+    },
+    /// A pressure that follows a face.
+    Pressure {
+        /// The face.
+        face: FaceSpec,
+        /// Force per current area, kPa; positive pushes into the body.
+        kpa: f64,
+    },
+    /// A dead force on a material point.
+    NodalForce {
+        /// Where the point is before anything moves, mm.
+        position_mm: [f64; 3],
+        /// mN.
+        mn: [f64; 3],
+    },
+    /// Springs under a face, from where it was before anything moved; they do not grow with the load.
+    Spring {
+        /// The face.
+        face: FaceSpec,
+        /// Force per reference area and motion, kPa/mm.
+        kpa_per_mm: f64,
+        /// Whether they resist only motion along the reference normal.
+        normal_only: bool,
+    },
+}
+
+/// A material point tied by a spring to where it was before anything moved: `[[attachment]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct AttachmentSpec {
+    /// Where the point is before anything moves, mm.
+    pub position_mm: [f64; 3],
+    /// Force per motion, mN/mm.
+    pub stiffness_mn_per_mm: f64,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
 }
 
 /// The activation of a muscle: one line of `[controls]`. A muscle without one rests at 0.

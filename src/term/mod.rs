@@ -6,6 +6,7 @@
 pub mod load;
 pub mod muscle;
 pub mod pressure;
+pub mod spring;
 pub mod tissue;
 
 use crate::material::PAIRS;
@@ -26,7 +27,7 @@ pub struct ElementState<'a> {
     pub p: &'a [f64; MAX_PRESSURES],
     /// All controls of the model, for example activations.
     pub controls: &'a [f64],
-    /// Factor on dead loads, 0 to 1 along the load path.
+    /// Factor on loads, 0 to 1 along the load path.
     pub load: f64,
 }
 
@@ -120,7 +121,7 @@ pub trait Term: Send + Sync {
     /// Adds dr/d(control), the force per unit of a control (for an activation: mN), in one element.
     fn add_control_force(&self, _control: usize, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
-    /// Adds dr/d(load) in one element. Zero unless the term is a dead load.
+    /// Adds dr/d(load) in one element. Zero unless the term is a load.
     fn add_load_force(&self, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
     /// Work of a dead load on the current displacement, uJ; zero for everything that is not one.
@@ -128,7 +129,7 @@ pub trait Term: Send + Sync {
         0.0
     }
 
-    /// Whether the term is a dead load, scaled by the load factor.
+    /// Whether the term is a load, scaled by the load factor.
     fn is_load(&self) -> bool {
         false
     }

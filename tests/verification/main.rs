@@ -1,5 +1,8 @@
 //! Closed forms and solved cases from an independent implementation, one file each.
 
+mod cardiac_beam;
+mod cooks_membrane;
+mod cylinder_inflation;
 mod free_contraction;
 mod patch_test;
 mod prescribed_state;

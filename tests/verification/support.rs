@@ -1,14 +1,14 @@
 //! What the verification cases share: reading reference numbers, building models by hand, comparing.
 
 use risorius::forward::{Drive, Equilibrium, Settings, Solver};
-use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;
-use risorius::mesh::Mesh;
+use risorius::material::{Law, MooneyRivlin};
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
 use risorius::mesh::face::Side;
 use risorius::mesh::fibre_angles::FibreAngles;
 use risorius::mesh::location::Locator;
+use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Ingredients, Model, State};
 use risorius::term::Term;
@@ -40,6 +40,29 @@ impl Discretisation {
     pub fn trilinear(kappa: f64, gauss: usize) -> Discretisation {
         Discretisation { kappa, gauss, space: &pressure::Trilinear }
     }
+}
+
+/// A body of one law without muscles.
+pub fn body<L: Law + 'static>(
+    mesh: Mesh,
+    law: L,
+    how: Discretisation,
+    loads: Vec<Box<dyn Term>>,
+    supports: Vec<Support>,
+) -> Model {
+    let shear_modulus = law.shear_modulus();
+    let tissue = Tissue::new(&mesh, law, how.kappa, how.space, how.gauss).expect("reference geometry is sound");
+    let volume = tissue.volume();
+    let mut terms: Vec<Box<dyn Term>> = vec![Box::new(tissue)];
+    terms.extend(loads);
+    let supports = Supports::new(&mesh, supports).expect("supports agree");
+    Model::new(Ingredients { mesh, space: how.space, terms, supports, controls: Vec::new(), shear_modulus, volume })
+        .expect("a model")
+}
+
+/// Where the material point that lies at the corner `xi` of `element` has come to.
+pub fn moved(model: &Model, found: &Equilibrium, element: usize, xi: [f64; 3]) -> [f64; 3] {
+    model.mesh().interpolate(MaterialPoint { element, xi }, &model.current(&found.state))
 }
 
 /// A model of Table 2's tissue with muscles (activation k is control k), loads and supports.

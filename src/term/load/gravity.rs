@@ -1,5 +1,5 @@
-//! Weight: f = integral over the reference volume of rho g N_a. With rho in kg/m3 and g in m/s2, rho g is in
-//! N/m3 = 1e-6 mN/mm3.
+//! Forces on the volume: f = integral over the reference volume of b N_a with a force b per volume; for weight b = rho g.
+//! With rho in kg/m3 and g in m/s2, rho g is in N/m3 = 1e-6 mN/mm3.
 
 use super::DeadLoad;
 use crate::math::quadrature::GaussRule;
@@ -8,7 +8,11 @@ use crate::mesh::{Mesh, position_and_jacobian};
 
 /// Gravity on the whole host: density in kg/m3, acceleration in m/s2, `gauss` points per direction.
 pub fn gravity(mesh: &Mesh, density: f64, acceleration: Vector, gauss: usize) -> DeadLoad {
-    let per_volume = acceleration.map(|a| 1e-6 * density * a);
+    DeadLoad { name: "gravity", ..body_force(mesh, acceleration.map(|a| 1e-6 * density * a), gauss) }
+}
+
+/// A force in mN/mm3 of reference volume on the whole host, `gauss` points per direction.
+pub fn body_force(mesh: &Mesh, per_volume: Vector, gauss: usize) -> DeadLoad {
     let rule = GaussRule::new(gauss);
     let forces = (0..mesh.elements()).map(|element| {
         let local = mesh.local(element);
@@ -22,5 +26,5 @@ pub fn gravity(mesh: &Mesh, density: f64, acceleration: Vector, gauss: usize) ->
         }
         Some(per_volume.map(|f| integral.map(|n| f * n)))
     });
-    DeadLoad { name: "gravity", forces: forces.collect(), points: rule.len().pow(3) }
+    DeadLoad { name: "body_force", forces: forces.collect(), points: rule.len().pow(3) }
 }

@@ -1,11 +1,16 @@
-//! FAMILY of dead loads: constant forces on the reference body, scaled by the load factor.
+//! FAMILY of loads, scaled by the load factor: dead loads, which are constant forces on the reference body, and a
+//! pressure that follows the surface.
 //!
-//! Pi = - load f . u, so that dPi/du = - load f. To add one: a file here that computes f, and its line in the model.
+//! Dead: Pi = - load f . u, so that dPi/du = - load f. To add one: a file here that computes f, and its line in the model.
 
 mod gravity;
+mod nodal_force;
+mod pressure;
 mod traction;
 
-pub use gravity::gravity;
+pub use gravity::{body_force, gravity};
+pub use nodal_force::nodal_force;
+pub use pressure::FollowerPressure;
 pub use traction::traction;
 
 use super::{Contribution, ElementState, ElementSystem, Term, Want};

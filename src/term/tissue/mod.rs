@@ -36,7 +36,10 @@ pub struct Inverted {
 
 /// The passive tissue of the whole host.
 pub struct Tissue<L> {
-    law: L,
+    /// The law of the whole, then those of parts.
+    laws: Vec<L>,
+    /// The law of each element.
+    law_of: Vec<usize>,
     /// Volumetric modulus kappa beside the pressure, kPa; 0 is the paper's own setting.
     kappa: f64,
     tables: Tables,
@@ -95,13 +98,22 @@ impl<L: Law> Tissue<L> {
             elements.push(reference);
         }
         Ok(Tissue {
-            law,
+            laws: vec![law],
+            law_of: vec![0; mesh.elements()],
             kappa,
             tables: Tables::new(&rule.points),
             pressure: points.iter().map(|(xi, _)| space.values(*xi)).collect(),
             elements,
             arch: Arch::new(),
         })
+    }
+
+    /// Gives the elements of a part other constants.
+    pub fn set_law(&mut self, elements: &[usize], law: L) {
+        for element in elements {
+            self.law_of[*element] = self.laws.len();
+        }
+        self.laws.push(law);
     }
 
     /// The reference volume, mm3.
@@ -171,6 +183,7 @@ fn add<L: Law, const FMA: bool>(
 ) -> Contribution {
     let points = tissue.pressure.len();
     let reference = &tissue.elements[state.element];
+    let law = &tissue.laws[tissue.law_of[state.element]];
     let padded = reference.weight.len() * WIDTH;
 
     // dx/dxi at the points; the lanes that fill up the last batch repeat the last point
@@ -213,7 +226,18 @@ fn add<L: Law, const FMA: bool>(
             }
         }
         let (inverse, weight) = (&reference.inverse[batch], reference.weight[batch]);
-        let j = point_response(tissue, &dx, inverse, weight, pressure, first, stiffness, &mut fields, &mut energy);
+        let j = point_response(
+            law,
+            tissue.kappa,
+            &dx,
+            inverse,
+            weight,
+            pressure,
+            first,
+            stiffness,
+            &mut fields,
+            &mut energy,
+        );
         for (lane, &j) in j.0.iter().enumerate().take(points - first.min(points)) {
             if j.is_nan() || j < det_f.min {
                 (det_f.min, det_f.min_point) = (j, first + lane);
@@ -260,7 +284,8 @@ fn add<L: Law, const FMA: bool>(
 #[inline(always)]
 #[allow(clippy::too_many_arguments)] // one call site; the arguments are the loop's own variables
 fn point_response<L: Law>(
-    tissue: &Tissue<L>,
+    law: &L,
+    kappa: f64,
     dx: &MatrixLanes,
     inverse: &MatrixLanes,
     weight: Lanes,
@@ -277,11 +302,10 @@ fn point_response<L: Law>(
             f[i][p] = dx[i][0] * inverse[0][p] + dx[i][1] * inverse[1][p] + dx[i][2] * inverse[2][p];
         }
     }
-    let response = tissue.law.response(&f);
+    let response = law.response(&f);
     let h = cofactors(&f);
     let j = dot(f[0], h[0]);
     let j_inverse = j.recip();
-    let kappa = tissue.kappa;
     // U = kappa/4 (J^2 - 1 - 2 ln J), U' = kappa/2 (J - 1/J), U'' = kappa/2 (1 + 1/J^2)
     let u = (0.25 * kappa) * (j * j + Lanes::splat(-1.0) - 2.0 * j.map(f64::ln));
     let slope = (0.5 * kappa) * (j - j_inverse) - pressure;
