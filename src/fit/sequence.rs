@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::model::{Model, State};
-use crate::scene::{ControlValue, FitSpec, Scene, SensitivitySpec};
+use crate::scene::{FitSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -79,14 +79,15 @@ impl<'m> Fit<'m> {
         check_units(&markers, model.mesh(), recording, fit)?;
         let settings = settings(scene);
         let mut solver = Solver::new(model, settings)?;
-        let index = |name: &String| model.controls().iter().position(|c| c.name == *name);
-        let unknowns: Vec<usize> = fit.unknowns.iter().filter_map(index).collect();
+        let unknowns: Vec<usize> =
+            fit.unknowns.iter().flat_map(|name| model.muscle_controls(name)).copied().collect();
         let mut held = vec![0.0; model.controls().len()];
         for control in &scene.controls {
-            if let (Some(k), ControlValue::Constant(value)) = (index(&control.name), &control.value)
-                && !unknowns.contains(&k)
-            {
-                held[k] = *value;
+            let own = model.muscle_controls(&control.name);
+            for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
+                if !unknowns.contains(k) {
+                    held[*k] = value;
+                }
             }
         }
         let start = Drive { controls: held.clone(), load: 1.0 };

@@ -97,6 +97,11 @@ impl Model {
         self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_muscle()?)))
     }
 
+    /// The controls of the muscle of this name: one, or one for every node of its mesh. None if there is no such muscle.
+    pub fn muscle_controls(&self, name: &str) -> &[usize] {
+        self.terms().iter().find(|t| t.as_muscle().is_some() && t.name() == name).map_or(&[], |t| t.controls())
+    }
+
     /// Inputs in their order in [`State::controls`].
     pub fn controls(&self) -> &[Control] {
         &self.ingredients.controls
