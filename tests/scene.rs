@@ -318,10 +318,7 @@ fn a_field_of_activations_has_a_value_for_every_node() {
     assert_eq!(scene.controls[0].value.constants(8), Some(vec![0.05; 8]));
     let list = "controls.risorius.L=[0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]";
     let scene = parse(&field, &[list]).unwrap();
-    assert_eq!(
-        scene.controls[0].value,
-        ControlValue::Nodes(vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
-    );
+    assert_eq!(scene.controls[0].value, ControlValue::Nodes(vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]));
     let again = parse(&scene.lock(), &[]).unwrap();
     assert_eq!((content(&scene), scene.lock()), (content(&again), again.lock()));
     for (text, set, code, told) in [

@@ -1,5 +1,6 @@
 //! Closed forms and solved cases from an independent implementation, one file each.
 
+mod activation_field;
 mod cardiac_beam;
 mod cooks_membrane;
 mod cylinder_inflation;
