@@ -252,7 +252,7 @@ impl Model {
         })
     }
 
-    /// Work of dead loads on the displacement of a state, uJ.
+    /// Work of loads on the straight way to the displacement of a state, uJ.
     pub fn external_work(&self, state: &State) -> f64 {
         let loads: Vec<_> = self.terms().iter().filter(|t| t.is_load()).collect();
         if loads.is_empty() {

@@ -152,7 +152,8 @@ fn pressure_all_around_only_raises_the_pressure() {
     let tie = "[[attachment]]\nposition_mm = [0, 0, 0]\nstiffness_mn_per_mm = 1\n\
         [[attachment]]\nposition_mm = [20, 0, 0]\nstiffness_mn_per_mm = 1\n\
         [[attachment]]\nposition_mm = [0, 10, 10]\nstiffness_mn_per_mm = 1\n";
-    let (_, found) = solved(&format!("{BLOCK}{tie}{faces}"));
+    let (model, found) = solved(&format!("{BLOCK}{tie}{faces}"));
+    assert!(model.external_work(&found.state).abs() < 1e-6);
     assert!(found.state.u.iter().flatten().all(|u| u.abs() < 1e-8));
     assert!(found.state.p.iter().all(|p| (p - 2.5).abs() < 1e-8), "{:?}", found.state.p);
 }
