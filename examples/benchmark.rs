@@ -103,14 +103,13 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
         (build(&scene)?.model, start.elapsed().as_secs_f64())
     };
     let mut solver = Solver::new(&model, Default::default())?;
-    let controls: Vec<f64> = scene
-        .controls
-        .iter()
-        .map(|c| match c.value {
-            risorius::scene::ControlValue::Constant(value) => value,
-            risorius::scene::ControlValue::Csv(_) => 0.0,
-        })
-        .collect();
+    let mut controls = vec![0.0; model.controls().len()];
+    for control in &scene.controls {
+        let own = model.muscle_controls(&control.name);
+        for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
+            controls[*k] = value;
+        }
+    }
     let start = Instant::now();
     let found = solver.equilibrium(&model.rest(), &Drive { controls, load: 1.0 }).map_err(risorius::Error::from)?;
     let solve_seconds = start.elapsed().as_secs_f64();

@@ -3,7 +3,8 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, PartSpec, Scene, SupportKind, Task, Units,
+    ActivationSpec, ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, PartSpec, Scene, SupportKind,
+    Task, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -307,6 +308,30 @@ fn a_fit_under_a_pressure_is_warned_that_its_sensitivities_are_approximate() {
         |overrides: &[&str]| -> Vec<_> { parse(&text, overrides).unwrap().warnings.iter().map(|w| w.code).collect() };
     assert_eq!(codes(&["fit.sensitivity=tangent"]), ["C020"]);
     assert!(codes(&[]).is_empty());
+}
+
+#[test]
+fn a_field_of_activations_has_a_value_for_every_node() {
+    let field = WHOLE.replace("name = \"risorius.L\"", "name = \"risorius.L\"\nactivation = \"field\"");
+    let scene = parse(&field, &[]).unwrap();
+    assert_eq!(scene.muscles[1].activation, ActivationSpec::Field);
+    assert_eq!(scene.controls[0].value.constants(8), Some(vec![0.05; 8]));
+    let list = "controls.risorius.L=[0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]";
+    let scene = parse(&field, &[list]).unwrap();
+    assert_eq!(scene.controls[0].value, ControlValue::Nodes(vec![0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]));
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!((content(&scene), scene.lock()), (content(&again), again.lock()));
+    for (text, set, code, told) in [
+        (field.as_str(), "controls.risorius.L=[0.1, 0.2]", "C007", "activations for 2 nodes, but needs 8"),
+        (&field, "controls.risorius.L=[0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 1.7]", "C005", "from 0 to 1"),
+        (WHOLE, list, "C004", "a number"),
+        (WHOLE, "muscle.slab.activation=nodes", "C006", "it can be \"uniform\", \"field\""),
+    ] {
+        let error = parse(text, &[set]).expect_err(set);
+        let rendered = render_error(&error, false);
+        assert_eq!((error.mistakes().len(), error.code()), (1, code), "{rendered}");
+        assert!(rendered.contains(told), "{told} is not told:\n{rendered}");
+    }
 }
 
 #[test]

@@ -17,7 +17,7 @@ use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
 use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
-use risorius::term::muscle::Muscle;
+use risorius::term::muscle::{Activation, Muscle};
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
 use risorius::term::spring::{Resists, Springs};
 use risorius::term::tissue::Tissue;
@@ -36,18 +36,24 @@ fn tissue(mesh: &Mesh, kappa: f64, space: &dyn PressureSpace) -> Box<dyn Term> {
 
 /// A muscle of 2 x 1 x 1 curved elements, its fibres twisted, in the middle of the host.
 fn muscle(host: &Mesh, element: &'static dyn Element) -> Box<dyn Term> {
+    activated(host, element, Activation::Uniform(0))
+}
+
+fn activated(host: &Mesh, element: &'static dyn Element, activation: Activation) -> Box<dyn Term> {
     let mut mesh = block(element, [3.0, 4.0, 3.0], [14.0, 11.0, 4.0], [2, 1, 1]);
     let mut random = Random::new(22);
     mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
     let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
-    let muscle = Muscle::new("muscle", &Locator::new(host), &mesh, &angles, 3, FIBRE, 0).expect("embedded");
+    let muscle = Muscle::new("muscle", &Locator::new(host), &mesh, &angles, 3, FIBRE, activation).expect("embedded");
     Box::new(muscle)
 }
 
 /// A model of the host with the given terms alone.
 fn model(mesh: Mesh, space: &'static dyn PressureSpace, terms: Vec<Box<dyn Term>>, supports: Vec<Support>) -> Model {
     let supports = Supports::new(&mesh, supports).expect("supports agree");
-    let controls = vec![Control { name: "muscle".into(), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 }];
+    let count = terms.iter().flat_map(|t| t.controls()).max().map_or(1, |most| most + 1);
+    let control = |k| Control { name: format!("muscle[{k}]"), lower: 0.0, upper: 1.0, onset: 1.4 / 300.0 };
+    let controls = (0..count).map(control).collect();
     Model::new(Ingredients { mesh, space, terms, supports, controls, shear_modulus: 1.4, volume: 4000.0 })
         .expect("a model")
 }
@@ -69,6 +75,7 @@ fn cases() -> Vec<(String, Model)> {
     };
     single("muscle of Hermite elements", &|mesh| muscle(mesh, &TricubicHermite));
     single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
+    single("muscle with a field of activations", &|mesh| activated(mesh, &Trilinear, Activation::Field(0)));
     single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
     single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
     single("body force", &|mesh| Box::new(body_force(mesh, [0.01, 0.0, -0.02], 4)));
@@ -98,7 +105,7 @@ fn random_state(model: &Model, seed: u64) -> State {
         *u = std::array::from_fn(|i| bent[i] + 0.3 * wiggle[i]);
     }
     state.p.iter_mut().for_each(|p| *p = random.next());
-    state.controls[0] = 0.4;
+    state.controls.iter_mut().enumerate().for_each(|(k, a)| *a = 0.4 / (k + 1) as f64);
     state.load = 0.7;
     state
 }
@@ -193,22 +200,28 @@ fn controls_and_loads_have_their_forces() {
     for (name, model) in cases() {
         let state = random_state(&model, 35);
         let residual = |state: State| evaluate(&model, &state).residual;
-        let controls = |h: f64| residual(State { controls: vec![state.controls[0] + h], ..state.clone() });
         let loads = |h: f64| residual(State { load: state.load + h, ..state.clone() });
-        let (by_control, by_load) = (model.control_force(&state, 0), model.load_force(&state));
         // both enter linearly
-        let (found_control, found_load) = (slope(controls, 0.1), slope(loads, 0.1));
-        if name.starts_with("muscle") {
-            assert_close(&name, &by_control, &found_control, 1e-12);
-        } else {
-            assert!(by_control.iter().chain(&found_control).all(|f| *f == 0.0), "{name}: depends on a control");
+        for control in 0..state.controls.len() {
+            let along = |h: f64| {
+                let mut state = state.clone();
+                state.controls[control] += h;
+                residual(state)
+            };
+            let (by_control, found) = (model.control_force(&state, control), slope(along, 0.1));
+            if name.starts_with("muscle") {
+                assert!(common::largest(&found) > 0.0);
+                assert_close(&name, &by_control, &found, 1e-12);
+            } else {
+                assert!(by_control.iter().chain(&found).all(|f| *f == 0.0), "{name}: depends on a control");
+            }
         }
+        let (by_load, found_load) = (model.load_force(&state), slope(loads, 0.1));
         if model.terms()[0].is_load() {
             assert_close(&name, &by_load, &found_load, 1e-12);
-            // the work of a dead load is minus its energy; what a pressure works depends on the way
+            // the work of a load is minus its energy
             let work = model.external_work(&state);
-            let expected = if name == "pressure" { 0.0 } else { -energy(&model, &state) };
-            assert!((work - expected).abs() <= 1e-13 * expected.abs(), "{name}: {work} instead of {expected}");
+            assert_close(&name, &[-energy(&model, &state)], &[work], 1e-13);
         } else {
             assert!(by_load.iter().chain(&found_load).all(|f| *f == 0.0), "{name}: depends on the load");
         }
@@ -278,6 +291,33 @@ fn the_tangent_of_a_pressure_is_symmetrised_at_a_free_rim() {
     }
     // there is something to symmetrise
     assert!(asymmetry > 0.1, "{asymmetry}");
+}
+
+/// A field that is the same in every node is one activation; a field that is not varies from point to point.
+#[test]
+fn a_constant_field_of_activations_is_one_activation() {
+    let build = |activation| {
+        let mesh = host();
+        let terms = vec![activated(&mesh, &TricubicHermite, activation)];
+        model(mesh, &pressure::Trilinear, terms, Vec::new())
+    };
+    let (one, field) = (build(Activation::Uniform(0)), build(Activation::Field(0)));
+    assert_eq!((one.controls().len(), field.controls().len()), (1, 12));
+    let state = random_state(&one, 48);
+    let same = State { controls: vec![0.4; 12], ..state.clone() };
+    assert_close("forces", &evaluate(&field, &same).residual, &evaluate(&one, &state).residual, 1e-13);
+    // the forces of all nodes together are the force of the one activation
+    let mut sum = vec![0.0; one.numbering().unknowns()];
+    for control in 0..12 {
+        sum.iter_mut().zip(field.control_force(&same, control)).for_each(|(s, f)| *s += f);
+    }
+    assert_close("forces per activation", &sum, &one.control_force(&state, 0), 1e-13);
+    let (_, muscle) = field.muscles().next().expect("a muscle");
+    assert!((muscle.mean_activation(&same.controls) - 0.4).abs() < 1e-14);
+    let ramp: Vec<f64> = (0..12).map(|node| 0.1 * (node % 3) as f64).collect();
+    let values: Vec<f64> = muscle.points().iter().map(|p| p.activation(&ramp)).collect();
+    let (min, max) = values.iter().fold((1.0_f64, 0.0_f64), |(a, b), v| (a.min(*v), b.max(*v)));
+    assert!(min > 0.0 && min < 0.02 && max < 0.2 && max > 0.18, "{min} to {max}");
 }
 
 /// A mesh whose node 1 hangs between its nodes 0 and 2: its parameters are sums over theirs, so the mesh has none

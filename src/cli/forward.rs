@@ -115,16 +115,19 @@ pub(super) fn probes(scene: &Scene, built: &Built) -> Vec<Probe> {
 /// Time and drive of every frame: one frame where all controls are constant, else one for every time of the curves.
 fn drives(scene: &Scene, built: &Built) -> Result<Vec<(f64, Drive)>> {
     let muscles: Vec<String> = scene.muscles.iter().map(|m| m.name.clone()).collect();
-    let mut curves: Vec<(usize, Curves)> = Vec::new();
+    // muscles driven by a table: name, controls, table
+    let mut curves: Vec<(&str, &[usize], Curves)> = Vec::new();
     let mut controls = vec![0.0; built.model.controls().len()];
     for control in &scene.controls {
-        let Some(index) = muscles.iter().position(|m| *m == control.name) else { continue };
-        match &control.value {
-            ControlValue::Constant(value) => controls[index] = *value,
-            ControlValue::Csv(path) => curves.push((index, Curves::read(path, &muscles)?)),
+        let own = built.model.muscle_controls(&control.name);
+        if let ControlValue::Csv(path) = &control.value {
+            curves.push((&control.name, own, Curves::read(path, &muscles)?));
+        }
+        for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
+            controls[*k] = value;
         }
     }
-    let mut times: Vec<f64> = curves.iter().flat_map(|(_, c)| c.times_s.iter().copied()).collect();
+    let mut times: Vec<f64> = curves.iter().flat_map(|(.., c)| c.times_s.iter().copied()).collect();
     times.sort_by(f64::total_cmp);
     times.dedup();
     if times.is_empty() {
@@ -132,8 +135,8 @@ fn drives(scene: &Scene, built: &Built) -> Result<Vec<(f64, Drive)>> {
     }
     let at = |time_s: f64| {
         let mut controls = controls.clone();
-        for (index, curve) in &curves {
-            controls[*index] = curve.at(&muscles[*index], time_s).unwrap_or(0.0);
+        for (name, own, curve) in &curves {
+            own.iter().for_each(|k| controls[*k] = curve.at(name, time_s).unwrap_or(0.0));
         }
         (time_s, Drive { controls, load: 1.0 })
     };

@@ -147,7 +147,7 @@ fn input_files(source: &Source) -> Vec<PathBuf> {
     let scene = &source.scene;
     let curves = scene.controls.iter().filter_map(|c| match &c.value {
         ControlValue::Csv(path) => Some(path.clone()),
-        ControlValue::Constant(_) => None,
+        ControlValue::Constant(_) | ControlValue::Nodes(_) => None,
     });
     let markers = scene.fit.iter().filter(|f| scene.task == Task::Fit && source.embedded_recording(f).is_none());
     let mut files: Vec<PathBuf> = curves.chain(markers.map(|f| f.markers.clone())).collect();

@@ -25,7 +25,7 @@ pub struct Fit<'m> {
     /// Values of all controls where they are not sought and do not change.
     held: Vec<f64>,
     /// Controls that follow a table over the time of the recording.
-    curves: Vec<(usize, Curves)>,
+    held_curves: Vec<HeldCurve>,
     sensitivity: Sensitivity,
     tolerance: f64,
     max_iterations: usize,
@@ -83,20 +83,26 @@ impl<'m> Fit<'m> {
         check_units(&markers, model.mesh(), recording, fit)?;
         let settings = settings(scene);
         let mut solver = Solver::new(model, settings)?;
-        let index = |name: &String| model.controls().iter().position(|c| c.name == *name);
-        let unknowns: Vec<usize> = fit.unknowns.iter().filter_map(index).collect();
+        let unknowns: Vec<usize> =
+            fit.unknowns.iter().flat_map(|name| model.muscle_controls(name)).copied().collect();
         let mut held = vec![0.0; model.controls().len()];
-        let mut curves = Vec::new();
+        let mut held_curves = Vec::new();
         let muscles: Vec<String> = scene.muscles.iter().map(|muscle| muscle.name.clone()).collect();
         for control in &scene.controls {
-            let Some(k) = index(&control.name).filter(|k| !unknowns.contains(k)) else { continue };
-            match &control.value {
-                ControlValue::Constant(value) => held[k] = *value,
-                ControlValue::Csv(path) => curves.push((k, Curves::read(path, &muscles)?)),
+            let own = model.muscle_controls(&control.name);
+            if let ControlValue::Csv(path) = &control.value {
+                let controls = own.iter().filter(|k| !unknowns.contains(k)).copied().collect();
+                let curves = Curves::read(path, &muscles)?;
+                held_curves.push(HeldCurve { controls, muscle: control.name.clone(), curves });
+            }
+            for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
+                if !unknowns.contains(k) {
+                    held[*k] = value;
+                }
             }
         }
         let first_s = recording.frames.get(fit.frames.first).map_or(0.0, |frame| frame.time_s);
-        let start = Drive { controls: held_at(model, &held, &curves, first_s), load: 1.0 };
+        let start = Drive { controls: held_at(&held, &held_curves, first_s), load: 1.0 };
         let last = solver.equilibrium(&model.rest(), &start)?;
         let sensitivity = match fit.sensitivity {
             SensitivitySpec::Tangent => Sensitivity::Tangent,
@@ -108,7 +114,7 @@ impl<'m> Fit<'m> {
             markers,
             unknowns,
             held,
-            curves,
+            held_curves,
             sensitivity,
             tolerance: fit.tolerance,
             max_iterations: fit.max_iterations,
@@ -175,7 +181,7 @@ impl<'m> Fit<'m> {
     /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
     fn optimise(&mut self, frame: usize, time_s: f64, measured: Vec<Measured>) -> Result<Optimum> {
         let model = self.solver.model();
-        let held = held_at(model, &self.held, &self.curves, time_s);
+        let held = held_at(&self.held, &self.held_curves, time_s);
         let range = |k: &usize| {
             let control = &model.controls()[*k];
             Range { lower: control.lower, upper: control.upper, onset: control.onset }
@@ -260,11 +266,20 @@ struct Optimum {
     iterations: Vec<FitIteration>,
 }
 
+/// Controls of one muscle that are not sought and follow a table.
+struct HeldCurve {
+    controls: Vec<usize>,
+    muscle: String,
+    curves: Curves,
+}
+
 /// The controls that are not sought, at a time in seconds; those that are, are 0.
-fn held_at(model: &Model, held: &[f64], curves: &[(usize, Curves)], time_s: f64) -> Vec<f64> {
+fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
     let mut held = held.to_vec();
-    for (k, curves) in curves {
-        held[*k] = curves.at(&model.controls()[*k].name, time_s).unwrap_or(held[*k]);
+    for HeldCurve { controls, muscle, curves } in curves {
+        if let Some(value) = curves.at(muscle, time_s) {
+            controls.iter().for_each(|k| held[*k] = value);
+        }
     }
     held
 }

@@ -13,17 +13,18 @@ use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    BlockSpec, ElementSpec, FaceSpec, FibresSpec, LoadKind, MuscleSpec, PressureSpec, Scene, SupportKind,
+    ActivationSpec, BlockSpec, ElementSpec, FaceSpec, FibresSpec, LoadKind, MuscleSpec, PressureSpec, Scene,
+    SupportKind,
 };
 use crate::term::Term;
 use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
-use crate::term::muscle::{Muscle, NotEmbedded};
+use crate::term::muscle::{Activation, Muscle, NotEmbedded};
 use crate::term::pressure::{self, PressureSpace};
 use crate::term::spring::{Resists, Springs};
 
 /// A model built from a scene, with the places in it that the scene names.
 pub struct Built {
-    /// The model; control k is the activation of the k-th muscle of the scene.
+    /// The model; its controls are the activations of the muscles of the scene, one after the other.
     pub model: Model,
     /// Where the probes of the scene are, in its order.
     pub probes: Vec<MaterialPoint>,
@@ -55,8 +56,15 @@ pub fn build(scene: &Scene) -> Result<Built> {
     let mut terms: Vec<Box<dyn Term>> = vec![tissue];
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
-    for (index, spec) in scene.muscles.iter().enumerate() {
-        match embed(spec, &locator, index) {
+    for spec in &scene.muscles {
+        let (activation, names) = match spec.activation {
+            ActivationSpec::Uniform => (Activation::Uniform(controls.len()), vec![spec.name.clone()]),
+            ActivationSpec::Field => {
+                let names = (0..spec.block.nodes()).map(|node| format!("{}[{node}]", spec.name));
+                (Activation::Field(controls.len()), names.collect())
+            }
+        };
+        match embed(spec, &locator, activation) {
             Ok(muscle) => {
                 warnings.extend(coarse_rule(spec, &scene.mesh.block));
                 terms.push(Box::new(muscle));
@@ -64,12 +72,8 @@ pub fn build(scene: &Scene) -> Result<Built> {
             Err(error) => mistakes.push(error),
         }
         let sigma_max = spec.blemker.sigma_max_kpa;
-        controls.push(Control {
-            name: spec.name.clone(),
-            lower: 0.0,
-            upper: 1.0,
-            onset: if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 },
-        });
+        let onset = if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 };
+        controls.extend(names.into_iter().map(|name| Control { name, lower: 0.0, upper: 1.0, onset }));
     }
     let point = |position: [f64; 3], what: &'static str, place: &Place| {
         locator.locate(position).map_err(|outside| Error::PointOutside {
@@ -145,7 +149,7 @@ fn faces<'m>(mesh: &'m Mesh, spec: &FaceSpec) -> &'m [Face] {
     mesh.named_faces.get(&spec.to_string()).map_or(&[], Vec::as_slice)
 }
 
-fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Muscle> {
+fn embed(spec: &MuscleSpec, locator: &Locator<'_>, activation: Activation) -> Result<Muscle> {
     let ElementSpec::Trilinear = spec.element;
     let mesh = block(&Trilinear, spec.block.origin_mm, spec.block.size_mm, spec.block.elements);
     let angles = match &spec.fibres {
@@ -162,7 +166,7 @@ fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Mus
         p1: b.p1,
         p2: b.p2,
     };
-    Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, control).map_err(|error| match error {
+    Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, activation).map_err(|error| match error {
         NotEmbedded::Outside { count, of, element, position, distance } => {
             Error::MuscleOutside(Box::new(MuscleOutside {
                 muscle: spec.name.clone(),

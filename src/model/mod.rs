@@ -97,6 +97,11 @@ impl Model {
         self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_muscle()?)))
     }
 
+    /// The controls of the muscle of this name: one, or one for every node of its mesh. None if there is no such muscle.
+    pub fn muscle_controls(&self, name: &str) -> &[usize] {
+        self.terms().iter().find(|t| t.as_muscle().is_some() && t.name() == name).map_or(&[], |t| t.controls())
+    }
+
     /// Inputs in their order in [`State::controls`].
     pub fn controls(&self) -> &[Control] {
         &self.ingredients.controls
@@ -247,7 +252,7 @@ impl Model {
         })
     }
 
-    /// Work of dead loads on the displacement of a state, uJ.
+    /// Work of loads on the straight way to the displacement of a state, uJ.
     pub fn external_work(&self, state: &State) -> f64 {
         let loads: Vec<_> = self.terms().iter().filter(|t| t.is_load()).collect();
         if loads.is_empty() {

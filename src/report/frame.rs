@@ -101,7 +101,7 @@ pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluatio
         }
         MuscleState {
             name: model.terms()[term].name(),
-            activation: state.controls[muscle.control()],
+            activation: muscle.mean_activation(&state.controls),
             mean_stretch: sum / muscle.volume(),
             min_stretch: min,
             max_stretch: max,

@@ -27,7 +27,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let supports = file.tables("support", support);
         let loads = file.tables("load", load);
         let attachments = file.tables("attachment", attachment);
-        let controls = file.or("controls", Vec::new(), |item| references.controls(&item));
+        let controls = file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref()));
         let probes = file.tables("probe", probe);
         let fit = if fitting {
             file.required("fit", "[fit]\nmarkers = \"recording.mcap\"\nunits = \"m\"", |item| {
@@ -208,6 +208,8 @@ fn muscle(table: &mut Table) -> Option<MuscleSpec> {
     let element = table
         .or("element", ElementSpec::Trilinear, |item| item.choice(&[("trilinear", ElementSpec::Trilinear)], &later));
     let fibres = fibres(table, block.as_ref());
+    let activations = [("uniform", ActivationSpec::Uniform), ("field", ActivationSpec::Field)];
+    let activation = table.or("activation", ActivationSpec::Uniform, |item| item.choice(&activations, &[]));
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
     let example = "blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }";
     let blemker = table.required("blemker", example, |item| item.table(blemker));
@@ -216,6 +218,7 @@ fn muscle(table: &mut Table) -> Option<MuscleSpec> {
         block: block?,
         element: element?,
         fibres: fibres?,
+        activation: activation?,
         gauss: gauss?,
         blemker: blemker?,
         place: table.place(),

@@ -156,7 +156,11 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
 }
 
 fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
-    let MuscleSpec { name, block: muscle_block, element, fibres, gauss, blemker, place: _ } = muscle;
+    let MuscleSpec { name, block: muscle_block, element, fibres, activation, gauss, blemker, place: _ } = muscle;
+    let activation = match activation {
+        ActivationSpec::Uniform => "uniform",
+        ActivationSpec::Field => "field",
+    };
     let ElementSpec::Trilinear = element;
     let BlemkerSpec { sigma_max_kpa, lambda_star, lambda_ofl, p1, p2 } = blemker;
     lines.extend([
@@ -172,6 +176,7 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
                 }) + "]"
             }
         },
+        format!("activation = \"{activation}\""),
         format!("gauss = {gauss}"),
         format!(
             "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
@@ -224,6 +229,7 @@ fn control_line(control: &ControlSpec) -> String {
     let ControlSpec { name, value, place: _ } = control;
     match value {
         ControlValue::Constant(activation) => format!("{} = {}", text(name), number(*activation)),
+        ControlValue::Nodes(activations) => format!("{} = {activations:?}", text(name)),
         ControlValue::Csv(csv) => format!("{} = {{ csv = {} }}", text(name), path(csv)),
     }
 }

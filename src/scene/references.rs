@@ -3,7 +3,7 @@
 use super::Curves;
 use super::cursor::{ACTIVATION, Item, Mistakes};
 use super::nearest::nearest;
-use super::spec::{ControlSpec, ControlValue};
+use super::spec::{ActivationSpec, ControlSpec, ControlValue, MuscleSpec};
 use super::tree::{Entry, Node, Value};
 use crate::error::{Error, Place};
 use std::cell::RefCell;
@@ -66,8 +66,9 @@ impl References {
         Some(names)
     }
 
-    /// `[controls]`: a value for each named muscle.
-    pub fn controls(&self, item: &Item) -> Option<Vec<ControlSpec>> {
+    /// `[controls]`: a value for each named muscle, or a list with one for each node of a field. The specs of the muscles
+    /// tell which is which; they are absent where one of them is mistaken.
+    pub fn controls(&self, item: &Item, muscles: Option<&[MuscleSpec]>) -> Option<Vec<ControlSpec>> {
         let Some(entries) = item.node.entries() else {
             // The type is wrong, which `table` notes.
             return item.table(|_| None);
@@ -82,6 +83,9 @@ impl References {
                     let path = table.required("csv", "csv = \"curves.csv\"", |item| self.file(&item))?;
                     known.and_then(|()| self.column(&path, name, &control)).map(|()| ControlValue::Csv(path))
                 }),
+                Value::List(_) => {
+                    nodes(&control, muscles.and_then(|all| all.iter().find(|muscle| muscle.name == *name)))
+                }
                 _ => control.number(ACTIVATION).map(ControlValue::Constant),
             };
             known?;
@@ -131,6 +135,22 @@ impl References {
         let place = control.node.place.clone();
         control.mistakes.add(Error::UnknownName { kind: "column", name: name.into(), help, place });
         None
+    }
+}
+
+/// The activations of a field at its nodes.
+fn nodes(control: &Item, muscle: Option<&MuscleSpec>) -> Option<ControlValue> {
+    if muscle.is_some_and(|muscle| muscle.activation == ActivationSpec::Uniform) {
+        // a list where a number belongs: the type is wrong, which `number` notes
+        return control.number(ACTIVATION).map(ControlValue::Constant);
+    }
+    let values = control.list("a list of numbers", |item| item.number(ACTIVATION))?;
+    match muscle.map(|muscle| muscle.block.nodes()) {
+        Some(count) if count != values.len() => control.wrong_length(
+            &format!("activations for {} nodes", values.len()),
+            &format!("{count}, one for each node of the block, x fastest"),
+        ),
+        _ => Some(ControlValue::Nodes(values)),
     }
 }
 

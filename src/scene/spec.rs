@@ -149,6 +149,8 @@ pub struct MuscleSpec {
     pub element: ElementSpec,
     /// The direction of its fibres.
     pub fibres: FibresSpec,
+    /// Whether it has one activation or a field of them.
+    pub activation: ActivationSpec,
     /// Gauss points per direction and muscle element, 1 to 8.
     pub gauss: usize,
     /// The constants of its force-stretch law.
@@ -164,6 +166,16 @@ pub struct MuscleSpec {
 pub enum ElementSpec {
     /// Eight corners, trilinear between them.
     Trilinear,
+}
+
+/// How a muscle is activated: `[[muscle]] activation`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ActivationSpec {
+    /// One control, called like the muscle.
+    Uniform,
+    /// A control for every node of the muscle's block, called `<muscle>[n]`, trilinear between them.
+    Field,
 }
 
 /// Fibre, imbrication and sheet angle, degrees, relative to the axes of the muscle elements.
@@ -343,10 +355,23 @@ pub struct ControlSpec {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControlValue {
-    /// The same at all times.
+    /// The same at all times, and in all nodes of a field.
     Constant(f64),
+    /// The same at all times, one for every node of a field: x fastest, then y, then z.
+    Nodes(Vec<f64>),
     /// The column with the name of the muscle in a table over time, see [`Curves`](super::Curves).
     Csv(PathBuf),
+}
+
+impl ControlValue {
+    /// The values of so many controls of a muscle, unless they change over time.
+    pub fn constants(&self, controls: usize) -> Option<Vec<f64>> {
+        match self {
+            ControlValue::Constant(value) => Some(vec![*value; controls]),
+            ControlValue::Nodes(values) => Some(values.clone()),
+            ControlValue::Csv(_) => None,
+        }
+    }
 }
 
 /// A material point whose motion is written to a table: `[[probe]]`.

@@ -124,7 +124,7 @@ pub trait Term: Send + Sync {
     /// Adds dr/d(load) in one element. Zero unless the term is a load.
     fn add_load_force(&self, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
-    /// Work of a dead load on the current displacement, uJ; zero for everything that is not one.
+    /// Work of a load on the straight way to the current displacement, uJ; zero for everything that is not one.
     fn external_work(&self, _state: &ElementState<'_>) -> f64 {
         0.0
     }

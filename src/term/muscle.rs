@@ -8,12 +8,16 @@
 //!   dPi/du_a     = sum w T n g_a
 //!   d2Pi/du du   = sum w D g_a g_b,   D = T' n (x) n + T/lambda (I - n (x) n)
 //!   d2Pi/du da   = sum w (dT/da) n g_a
+//!
+//! The activation is one control everywhere, or a field: a = sum over the muscle's nodes of psi_n a_n, trilinear in its
+//! elements, with a control a_n for every node; then d2Pi/du da_n has psi_n as a further factor.
 
 use super::{Contribution, ElementState, ElementSystem, Term, Want};
 use crate::material::PAIRS;
 use crate::material::fibre::Blemker;
 use crate::math::quadrature::GaussRule;
 use crate::math::tensor::{Vector, apply_transposed, determinant, dot, inverse, norm};
+use crate::mesh::element::{Element, Trilinear};
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::{Locator, Outside};
 use crate::mesh::{MaterialPoint, Mesh, position_and_jacobian};
@@ -23,8 +27,8 @@ use pulp::{Arch, Simd, WithSimd};
 pub struct Muscle {
     name: String,
     law: Blemker,
-    /// The control that is its activation.
-    control: [usize; 1],
+    /// The controls that are its activation.
+    controls: Vec<usize>,
     /// All points, sorted by host element.
     points: Vec<Point>,
     /// `starts[e]..starts[e + 1]` are the points in host element e.
@@ -45,8 +49,47 @@ pub struct Point {
     pub weight: f64,
     /// Unit fibre direction in the reference state.
     pub fibre: Vector,
+    /// Controls with their weights psi: the activation here is the sum of weight x control.
+    shares: Vec<(usize, f64)>,
     /// g_a = dN_a/dX . n0, 1/mm.
     gradient: [f64; 64],
+}
+
+/// Which controls activate a muscle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activation {
+    /// One everywhere, with this index.
+    Uniform(usize),
+    /// One for every node of the muscle's mesh in turn, from this index on; trilinear between them.
+    Field(usize),
+}
+
+/// One control everywhere.
+impl From<usize> for Activation {
+    fn from(control: usize) -> Activation {
+        Activation::Uniform(control)
+    }
+}
+
+impl Activation {
+    /// The controls of a muscle whose mesh has so many nodes.
+    pub fn controls(self, nodes: usize) -> std::ops::Range<usize> {
+        match self {
+            Activation::Uniform(control) => control..control + 1,
+            Activation::Field(first) => first..first + nodes,
+        }
+    }
+
+    /// Controls and weights at a point of an element of the muscle's mesh.
+    fn shares(self, mesh: &Mesh, element: usize, eta: [f64; 3]) -> Vec<(usize, f64)> {
+        match self {
+            Activation::Uniform(control) => vec![(control, 1.0)],
+            Activation::Field(first) => {
+                let weights = Trilinear.values(eta);
+                mesh.corners[element].iter().zip(weights).map(|(node, psi)| (first + node, psi)).collect()
+            }
+        }
+    }
 }
 
 /// Points of a muscle that the host does not hold, or that lie in an inverted element.
@@ -75,8 +118,8 @@ pub enum NotEmbedded {
 }
 
 impl Muscle {
-    /// Embeds `mesh` with its fibre angles in the host that `locator` searches; `gauss` points per direction in each of its elements. `control` is
-    /// the index of its activation.
+    /// Embeds `mesh` with its fibre angles in the host that `locator` searches; `gauss` points per direction in each of
+    /// its elements.
     pub fn new(
         name: &str,
         locator: &Locator<'_>,
@@ -84,8 +127,9 @@ impl Muscle {
         angles: &FibreAngles,
         gauss: usize,
         law: Blemker,
-        control: usize,
+        activation: impl Into<Activation>,
     ) -> Result<Muscle, NotEmbedded> {
+        let activation = activation.into();
         let host = locator.mesh();
         let rule = GaussRule::new(gauss);
         let per_element = rule.len().pow(3);
@@ -108,6 +152,7 @@ impl Muscle {
                         position,
                         weight: weight * det,
                         fibre,
+                        shares: activation.shares(mesh, element, eta),
                         gradient: directional_gradient(host, at, fibre),
                     }),
                     Err(found) => {
@@ -131,12 +176,16 @@ impl Muscle {
         for e in 0..host.elements() {
             starts[e + 1] += starts[e];
         }
-        Ok(Muscle { name: name.to_owned(), law, control: [control], points, starts, arch: Arch::new() })
+        let controls = activation.controls(mesh.nodes).collect();
+        Ok(Muscle { name: name.to_owned(), law, controls, points, starts, arch: Arch::new() })
     }
 
-    /// The index of its activation among the controls.
-    pub fn control(&self) -> usize {
-        self.control[0]
+    /// Its activation; of a field the mean over its reference volume.
+    pub fn mean_activation(&self, controls: &[f64]) -> f64 {
+        match self.controls[..] {
+            [control] => controls[control],
+            _ => self.points.iter().map(|p| p.weight * p.activation(controls)).sum::<f64>() / self.volume(),
+        }
     }
 
     /// Its points, sorted by host element.
@@ -160,6 +209,11 @@ impl Muscle {
 }
 
 impl Point {
+    /// The activation here.
+    pub fn activation(&self, controls: &[f64]) -> f64 {
+        self.shares.iter().map(|(control, psi)| psi * controls[*control]).sum()
+    }
+
     /// v = F n0 from the local parameters of x in the point's host element; |v| is the stretch.
     #[inline(always)]
     pub fn deformed_fibre(&self, x: &[[f64; 64]; 3]) -> Vector {
@@ -200,7 +254,7 @@ impl Term for Muscle {
     }
 
     fn controls(&self) -> &[usize] {
-        &self.control
+        &self.controls
     }
 
     fn as_muscle(&self) -> Option<&Muscle> {
@@ -209,18 +263,15 @@ impl Term for Muscle {
 
     fn add(&self, state: &ElementState<'_>, want: Want, system: &mut ElementSystem) -> Contribution {
         let points = self.points_in(state.element);
-        let activation = state.controls[self.control[0]];
-        self.arch.dispatch(Add { law: &self.law, activation, points, state, want, system })
+        self.arch.dispatch(Add { law: &self.law, points, state, want, system })
     }
 
     fn add_control_force(&self, control: usize, state: &ElementState<'_>, force: &mut [[f64; 64]; 3]) {
-        if control != self.control[0] {
-            return;
-        }
         for point in self.points_in(state.element) {
+            let Some((_, psi)) = point.shares.iter().find(|(own, _)| *own == control) else { continue };
             let v = point.deformed_fibre(state.x);
             let lambda = norm(v);
-            let per_activation = self.law.tension_per_activation(lambda).force * point.weight / lambda;
+            let per_activation = self.law.tension_per_activation(lambda).force * psi * point.weight / lambda;
             for i in 0..3 {
                 for (target, g) in force[i].iter_mut().zip(&point.gradient) {
                     *target += per_activation * v[i] * g;
@@ -233,7 +284,6 @@ impl Term for Muscle {
 /// [`Term::add`] for the points of one element, compiled once per instruction set.
 struct Add<'a> {
     law: &'a Blemker,
-    activation: f64,
     points: &'a [Point],
     state: &'a ElementState<'a>,
     want: Want,
@@ -252,7 +302,7 @@ impl WithSimd for Add<'_> {
             let v = point.deformed_fibre(self.state.x);
             let lambda = norm(v);
             let n = v.map(|c| c / lambda);
-            let tension = self.law.tension(lambda, self.activation);
+            let tension = self.law.tension(lambda, point.activation(self.state.controls));
             energy += point.weight * tension.energy;
             for i in 0..3 {
                 let force = point.weight * tension.force * n[i];

@@ -1,5 +1,7 @@
 //! Closed forms and solved cases from an independent implementation, one file each.
 
+mod activation_field;
+mod bars_and_springs;
 mod cardiac_beam;
 mod cooks_membrane;
 mod cylinder_inflation;

@@ -19,7 +19,7 @@ pub fn points(model: &Model, state: &State, time_s: f64) -> Grid {
                 position.push(mesh.interpolate(point.host, &x));
                 stretch.push(norm(v));
                 fibre.push(normalised(v));
-                activation.push(state.controls[muscle.control()]);
+                activation.push(point.activation(&state.controls));
                 index.push(number as i64);
                 element.push(point.host.element as i64);
                 volume.push(point.weight);

@@ -4,15 +4,18 @@
 //!   r_ia     = load p sum w N_a da_i
 //!   K_ia,kb  = load p sum w N_a e_ikm (N_b,s x,t_m - N_b,t x,s_m)
 //!
-//! Where the surface is closed, or its rim is held, this is the gradient of load p V with V = 1/3 sum w x . da, the
-//! volume behind the surface, and K is symmetric after assembly (Bufler 1984). Where the rim is free there is no energy:
-//! K has an antisymmetric part, which lives on the rim. Our tangents are symmetric, so that (K + K^T)/2 is added. The
-//! equilibrium is not touched by that; Newton's method comes to it a little more slowly, and sensitivities from the
-//! tangent are approximate. The energy told is load p (V - V at rest), and means something only without a free rim.
+//! Where the surface is closed, or its rim is held, this is the gradient of load p V with V the volume behind the surface,
+//! and K is symmetric after assembly (Bufler 1984). Where the rim is free there is no energy: K has an antisymmetric part,
+//! which lives on the rim. Our tangents are symmetric, so that (K + K^T)/2 is added. The equilibrium is not touched by
+//! that; Newton's method comes to it a little more slowly, and sensitivities from the tangent are approximate.
+//!
+//! The work told is that of the pressure on the straight way from X to x = X + u,
+//!   - load p sum w u . (da(X) + 4 da(X + u/2) + da(x))/6,
+//! which is exact, for da is quadratic along it; the energy is its opposite. Both depend on the way at a free rim alone.
 
 use crate::material::PAIRS;
 use crate::math::quadrature::GaussRule;
-use crate::math::tensor::{Vector, cross, dot};
+use crate::math::tensor::{Vector, add_scaled, cross, dot};
 use crate::mesh::Mesh;
 use crate::mesh::face::Face;
 use crate::term::{Contribution, ElementState, ElementSystem, Term, Want};
@@ -23,8 +26,6 @@ pub struct FollowerPressure {
     pressure: f64,
     /// Quadrature points of each element's faces.
     points: Vec<Vec<Point>>,
-    /// 1/3 sum w X . dA of each element.
-    volume_at_rest: Vec<f64>,
 }
 
 /// A quadrature point of a face.
@@ -38,17 +39,24 @@ struct Point {
 }
 
 impl Point {
-    /// x and x,s and x,t from the local parameters of x.
-    fn surface(&self, x: &[[f64; 64]; 3]) -> (Vector, [Vector; 2]) {
-        let along = |n: &[f64; 64]| x.map(|x| x.iter().zip(n).map(|(x, n)| x * n).sum());
-        (along(&self.values), [along(&self.slopes[0]), along(&self.slopes[1])])
+    /// x,s and x,t from the local parameters of x.
+    fn tangents(&self, x: &[[f64; 64]; 3]) -> [Vector; 2] {
+        [interpolated(&self.slopes[0], x), interpolated(&self.slopes[1], x)]
     }
 
-    /// x and the weighted outward da.
-    fn area(&self, x: &[[f64; 64]; 3]) -> (Vector, Vector) {
-        let (position, [s, t]) = self.surface(x);
-        (position, cross(s, t).map(|a| self.weight * a))
+    /// w u . (da(X) + 4 da(X + u/2) + da(x))/6 with u = x - X.
+    fn volume_swept(&self, state: &ElementState<'_>) -> f64 {
+        let [s, t] = self.tangents(state.x);
+        let [us, ut] = self.tangents(state.u);
+        let area = |part: f64| cross(add_scaled(s, -part, us), add_scaled(t, -part, ut));
+        let mean = add_scaled(add_scaled(area(0.0), 4.0, area(0.5)), 1.0, area(1.0));
+        self.weight * dot(interpolated(&self.values, state.u), mean) / 6.0
     }
+}
+
+/// The sum of n_a times local parameter a.
+fn interpolated(n: &[f64; 64], local: &[[f64; 64]; 3]) -> Vector {
+    local.map(|x| x.iter().zip(n).map(|(x, n)| x * n).sum())
 }
 
 impl FollowerPressure {
@@ -56,9 +64,7 @@ impl FollowerPressure {
     pub fn new(mesh: &Mesh, faces: &[Face], pressure: f64, gauss: usize) -> FollowerPressure {
         let rule = GaussRule::new(gauss);
         let mut points: Vec<Vec<Point>> = (0..mesh.elements()).map(|_| Vec::new()).collect();
-        let mut volume_at_rest = vec![0.0; mesh.elements()];
         for face in faces {
-            let local = mesh.local(face.element);
             let tangents = face.side.tangents();
             for (st, weight) in rule.square() {
                 let xi = face.side.lift(st);
@@ -68,27 +74,23 @@ impl FollowerPressure {
                     values: mesh.element.values(xi),
                     slopes: tangents.map(|d| gradients.map(|g| g[d])),
                 };
-                let (position, area) = point.area(&local);
-                volume_at_rest[face.element] += dot(position, area) / 3.0;
                 points[face.element].push(point);
             }
         }
-        FollowerPressure { pressure, points, volume_at_rest }
+        FollowerPressure { pressure, points }
     }
 
-    /// force += scale sum w N_a da; returns 1/3 sum w x . da.
-    fn push(&self, state: &ElementState<'_>, scale: f64, force: &mut [[f64; 64]; 3]) -> f64 {
-        let mut volume = 0.0;
+    /// force += scale sum w N_a da
+    fn push(&self, state: &ElementState<'_>, scale: f64, force: &mut [[f64; 64]; 3]) {
         for point in &self.points[state.element] {
-            let (position, area) = point.area(state.x);
-            volume += dot(position, area) / 3.0;
+            let [s, t] = point.tangents(state.x);
+            let area = cross(s, t).map(|a| point.weight * a);
             for i in 0..3 {
                 for (target, n) in force[i].iter_mut().zip(&point.values) {
                     *target += scale * area[i] * n;
                 }
             }
         }
-        volume
     }
 }
 
@@ -103,10 +105,10 @@ impl Term for FollowerPressure {
 
     fn add(&self, state: &ElementState<'_>, want: Want, system: &mut ElementSystem) -> Contribution {
         let scale = state.load * self.pressure;
-        let volume = self.push(state, scale, &mut system.force);
+        self.push(state, scale, &mut system.force);
         if want == Want::Stiffness {
             for point in &self.points[state.element] {
-                let (_, [s, t]) = point.surface(state.x);
+                let [s, t] = point.tangents(state.x);
                 for (block, (i, k)) in system.stiffness.iter_mut().zip(PAIRS).filter(|(_, (i, k))| i != k) {
                     // e_ikm with i < k
                     let m = 3 - i - k;
@@ -126,11 +128,16 @@ impl Term for FollowerPressure {
                 }
             }
         }
-        Contribution { energy: scale * (volume - self.volume_at_rest[state.element]), det_f: None }
+        Contribution { energy: -self.external_work(state), det_f: None }
     }
 
     fn add_load_force(&self, state: &ElementState<'_>, force: &mut [[f64; 64]; 3]) {
         self.push(state, self.pressure, force);
+    }
+
+    fn external_work(&self, state: &ElementState<'_>) -> f64 {
+        let swept: f64 = self.points[state.element].iter().map(|point| point.volume_swept(state)).sum();
+        -state.load * self.pressure * swept
     }
 
     fn is_load(&self) -> bool {
