@@ -7,7 +7,7 @@ use common::{Random, assert_close, curved_block, product};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;
-use risorius::math::tensor::{Matrix, Vector, apply};
+use risorius::math::tensor::{Matrix, Vector, apply, normalised};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
@@ -16,6 +16,9 @@ use risorius::mesh::location::Locator;
 use risorius::mesh::map::{ElementMap, Term as MapTerm};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
+use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
+use risorius::term::contact::{Contact, Interface};
 use risorius::term::load::{gravity, traction};
 use risorius::term::muscle::Muscle;
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
@@ -69,7 +72,53 @@ fn cases() -> Vec<(String, Model)> {
     single("muscle of Hermite elements", &|mesh| muscle(mesh, &TricubicHermite));
     single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
     single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
+    // gauss = 3: 36 points; the plane and the sphere meet a part of them
+    for (name, allows, surface, law, relax) in contacts() {
+        single(&name, &|mesh| {
+            let faces = &mesh.named_faces["xi3=0"];
+            let interface = Interface { allows, surface: surface(mesh), law: law(), relax };
+            Box::new(Contact::new("contact", interface, mesh, faces, 3))
+        });
+    }
     single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
+    all
+}
+
+type MakeSurface = fn(&Mesh) -> Box<dyn RigidSurface>;
+type MakeLaw = fn() -> Box<dyn ContactLaw>;
+
+/// Every surface with every law: (name, what it allows, surface, law, whether it relaxes).
+fn contacts() -> Vec<(String, Allows, MakeSurface, MakeLaw, bool)> {
+    const FREE: FreeSide = FreeSide::Outside;
+    let surfaces: [(&str, MakeSurface); 5] = [
+        ("plane", |_| Box::new(Plane { through: [10.0, 10.0, 0.7], normal: normalised([0.1, -0.1, 1.0]) })),
+        ("sphere", |_| Box::new(Sphere { centre: [10.0, 9.0, -18.0], radius: 19.0, free: FREE })),
+        ("cylinder", |_| {
+            let axis = normalised([1.0, 0.2, 0.1]);
+            Box::new(Cylinder { through: [0.0, 8.0, -30.0], axis, radius: 30.0, free: FREE })
+        }),
+        ("capsule", |_| {
+            Box::new(Capsule { ends: [[7.0, 8.0, -20.0], [14.0, 9.0, -19.0]], radius: 21.0, free: FREE })
+        }),
+        ("reference", |mesh| Box::new(Patches::new(mesh, &mesh.named_faces["xi3=0"], FreeSide::Inside))),
+    ];
+    let laws: [(&str, MakeLaw); 2] = [
+        ("penalty", || Box::new(Penalty { stiffness: 2.0 })),
+        ("augmented", || Box::new(Augmented { stiffness: 2.0, tolerance: 1e-6 })),
+    ];
+    let mut all = Vec::new();
+    for (surface, make_surface) in surfaces {
+        for (law, make_law) in laws {
+            for (kind, allows) in [("sliding", Allows::Closed), ("contact", Allows::ClosedOrOpen)] {
+                let relax = surface == "sphere";
+                let relaxing = if relax { ", relaxing" } else { "" };
+                all.push((format!("{kind}, {surface}, {law}{relaxing}"), allows, make_surface, make_law, relax));
+            }
+        }
+    }
+    let below: MakeSurface = |_| Box::new(Plane { through: [0.0, 0.0, -8.0], normal: [0.0, 0.0, 1.0] });
+    let barrier: MakeLaw = || Box::new(Barrier { stiffness: 2.0, range: 9.0 });
+    all.push(("contact, plane, barrier".into(), Allows::ClosedOrOpen, below, barrier, false));
     all
 }
 
@@ -85,6 +134,7 @@ fn random_state(model: &Model, seed: u64) -> State {
     state.p.iter_mut().for_each(|p| *p = random.next());
     state.controls[0] = 0.4;
     state.load = 0.7;
+    state.multipliers.iter_mut().flatten().for_each(|m| *m = 0.5 * random.next());
     state
 }
 
@@ -143,6 +193,7 @@ fn forces_are_slopes_of_the_energy() {
     for (name, model) in cases() {
         let state = random_state(&model, 31);
         let residual = evaluate(&model, &state).residual;
+        assert!(common::largest(&residual) > 0.0, "{name}: no force to test");
         for v in directions(&model, 32) {
             let power: f64 = residual.iter().zip(&v).map(|(r, v)| r * v).sum();
             let found = slope(|h| vec![energy(&model, &moved(&model, &state, &v, h))], 1e-3)[0];
@@ -188,7 +239,10 @@ fn controls_and_loads_have_their_forces() {
         } else {
             assert!(by_control.iter().chain(&found_control).all(|f| *f == 0.0), "{name}: depends on a control");
         }
-        if model.terms()[0].is_load() {
+        if name.ends_with("relaxing") {
+            assert!(common::largest(&by_load) > 0.0, "{name}: the load relaxes it");
+            assert_close(&name, &by_load, &found_load, 1e-10);
+        } else if model.terms()[0].is_load() {
             assert_close(&name, &by_load, &found_load, 1e-12);
             // the work of a dead load is minus its energy
             let work = model.external_work(&state);
@@ -203,7 +257,8 @@ fn controls_and_loads_have_their_forces() {
 #[test]
 fn rigid_motion_costs_nothing() {
     let mut random = Random::new(36);
-    for (name, model) in cases().into_iter().filter(|(_, model)| !model.terms()[0].is_load()) {
+    let own = |model: &Model| !model.terms()[0].is_load() && model.contacts().next().is_none();
+    for (name, model) in cases().into_iter().filter(|(_, model)| own(model)) {
         let state = random_state(&model, 37);
         let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
         let mut turned = state.clone();
@@ -217,6 +272,36 @@ fn rigid_motion_costs_nothing() {
         let rotated: Vec<Vector> = before.force.iter().map(|f| apply(&turn, *f)).collect();
         assert_close(&name, after.force.as_flattened(), rotated.as_flattened(), 1e-11);
     }
+}
+
+/// A body and its surface that move together keep the energy of their contact, and its forces turn with them.
+#[test]
+fn a_body_moves_with_its_surface() {
+    let mut random = Random::new(38);
+    let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
+    let carry = |mesh: &Mesh, at: &[Vector]| -> Vec<Vector> {
+        let one = |(k, x): (usize, &Vector)| {
+            let rotated = apply(&turn, *x);
+            if mesh.parameter_derivative[k] == 0 { std::array::from_fn(|i| rotated[i] + shift[i]) } else { rotated }
+        };
+        at.iter().enumerate().map(one).collect()
+    };
+    let build = |mesh: Mesh| {
+        let faces = mesh.named_faces["xi3=0"].clone();
+        let surface = Box::new(Patches::new(&mesh, &faces, FreeSide::Inside));
+        let law = Box::new(Penalty { stiffness: 2.0 });
+        let interface = Interface { allows: Allows::Closed, surface, law, relax: false };
+        let term: Box<dyn Term> = Box::new(Contact::new("contact", interface, &mesh, &faces, 3));
+        model(mesh, &pressure::Trilinear, vec![term], Vec::new())
+    };
+    let here = build(host());
+    let there = build(Mesh { parameters: carry(&host(), &host().parameters), ..host() });
+    let state = random_state(&here, 39);
+    let turned_u = state.u.iter().map(|u| apply(&turn, *u)).collect();
+    let (before, after) = (evaluate(&here, &state), evaluate(&there, &State { u: turned_u, ..state.clone() }));
+    assert_close("energy", &after.energies, &before.energies, 1e-11);
+    let rotated: Vec<Vector> = before.force.iter().map(|f| apply(&turn, *f)).collect();
+    assert_close("forces", after.force.as_flattened(), rotated.as_flattened(), 1e-10);
 }
 
 /// At rest the tissue is free of force, and a rigid motion of it has no stiffness.

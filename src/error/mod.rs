@@ -504,6 +504,20 @@ pub enum Error {
         /// The norm required, mN.
         required: f64,
     },
+    /// Multipliers did not close a gap.
+    #[error(
+        "`{name}`: after {rounds} rounds of multipliers a gap of {gap:.2e} mm remains, allowed are {tolerance:.2e} mm"
+    )]
+    GapNotClosed {
+        /// The sliding or contact.
+        name: Box<str>,
+        /// The largest gap that should be zero, mm.
+        gap: f64,
+        /// What may remain, mm.
+        tolerance: f64,
+        /// Rounds done.
+        rounds: usize,
+    },
     /// A refined solution of a linear system is not accurate enough.
     #[error(
         "a linear system was solved to a relative residual of {residual:.1e}, required {required:.1e}: the tangent is close to singular"
@@ -630,6 +644,7 @@ impl Error {
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
+            Error::GapNotClosed { .. } => "S006",
             Error::Singular { .. } => "S010",
             Error::FactorTooLarge { .. } => "S011",
             Error::NotFactored => "S012",
@@ -726,6 +741,10 @@ impl Error {
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
             }
+            Error::GapNotClosed { .. } => Some(
+                "raise kpa_per_mm of its law, or gap_mm: the elements may be too large to follow the surface more closely"
+                    .into(),
+            ),
             Error::NotConverged { .. } => Some(
                 "the last equilibrium is kept; try shorter steps (--set solver.step_max=0.05), a volumetric term \
                  (--set tissue.kappa_kpa=10), a finer mesh where det F is small, or a smaller load"

@@ -4,7 +4,7 @@ mod balance;
 
 use crate::error::{Error, Result};
 use crate::math::factor;
-use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
+use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
@@ -21,6 +21,8 @@ const CHORD_ITERATIONS: usize = 8;
 const NEAR_ITERATIONS: usize = 8;
 /// Below this length a step onto a saddle is believed.
 const SHORT_FOR_A_JUMP: f64 = 0.02;
+/// Rounds of multipliers before a gap counts as one that does not close.
+const MULTIPLIER_ROUNDS: usize = 200;
 const LONGEST_STEP: f64 = 2.0;
 /// A support rotates by no more than this in one step, radians.
 const LARGEST_ROTATION: f64 = std::f64::consts::PI / 8.0;
@@ -186,14 +188,20 @@ impl<'m> Solver<'m> {
         if self.balance.has_tangent() {
             let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0 };
             if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
-                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+                let history = vec![step(1.0, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                    return Ok(found);
+                }
             }
         }
         let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), damping: DAMPING };
         if let Ok(outcome) = newton(&mut self.balance, guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {
-                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+                let history = vec![step(1.0, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                    return Ok(found);
+                }
             }
         }
         self.equilibrium(from, to)
@@ -251,7 +259,53 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        Ok(self.finish(last, history))
+        self.balance.set_target(to.clone());
+        self.close_gaps(last, history)
+    }
+
+    /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.
+    fn close_gaps(&mut self, start: State, mut history: Vec<Step>) -> std::result::Result<Equilibrium, Box<Failure>> {
+        let mut state = start;
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING };
+        for round in 0.. {
+            let model = self.balance.model;
+            let Some(Renewal { multipliers, term, gap, tolerance }) = model.renew_multipliers(&state) else { break };
+            if gap <= tolerance {
+                break;
+            }
+            let fail = |error: Error, failed: State, last_good: State| {
+                Err(Box::new(Failure { error, last_good, reached: 1.0, failed }))
+            };
+            if round == MULTIPLIER_ROUNDS {
+                let name = model.terms()[term].name().into();
+                let error = Error::GapNotClosed { name, gap, tolerance, rounds: round };
+                return fail(error, state.clone(), state);
+            }
+            let next = State { multipliers, ..state.clone() };
+            let limits_near = Limits { iterations: CHORD_ITERATIONS, damping: 1.0 };
+            let near = if self.balance.has_tangent() {
+                chord(&mut self.balance, next.clone(), limits_near)
+            } else {
+                Ok(None)
+            };
+            let found = match near {
+                Ok(Some(outcome)) => Ok(outcome),
+                _ => newton(&mut self.balance, next, limits),
+            };
+            match found {
+                Ok(Outcome { state: balanced, last, iterations, stop: None }) => {
+                    history.push(step(1.0, last, iterations));
+                    state = balanced;
+                }
+                Ok(outcome) => {
+                    let error =
+                        self.not_converged(&Stepper::at_end(), outcome.stop.unwrap_or(Stop::Iterations), &outcome);
+                    return fail(error, state, outcome.state);
+                }
+                Err(error) => return fail(error, state.clone(), state),
+            }
+        }
+        Ok(self.finish(state, history))
     }
 
     fn finish(&mut self, state: State, history: Vec<Step>) -> Equilibrium {
