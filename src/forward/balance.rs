@@ -225,7 +225,8 @@ impl<'m> Balance<'m> {
             let r = residual[self.model.numbering().pressure_unknown(index)];
             sum += (weight * weight - 1.0) * r * r;
         }
-        sum.max(0.0).sqrt()
+        // rounding may leave a sum below zero; a NaN stays one
+        if sum < 0.0 { 0.0 } else { sum.sqrt() }
     }
 }
 
@@ -288,6 +289,10 @@ impl Equations for Balance<'_> {
             }
         }
         next
+    }
+
+    fn slope(&self, step: &Direction) -> f64 {
+        step.unknowns.iter().zip(&self.residual).map(|(d, r)| d * r).sum()
     }
 
     /// Root mean square of displacements over the element size and of pressures over the shear modulus.

@@ -1,6 +1,9 @@
 //! Closed forms and solved cases from an independent implementation, one file each.
 
+mod contact_closed_forms;
+mod contact_sensitivities;
 mod free_contraction;
+mod hertz;
 mod patch_test;
 mod prescribed_state;
 mod rivlin_torsion;

@@ -2,7 +2,7 @@
 
 use super::{Allows, ContactLaw, Response};
 
-/// psi = l g + k/2 g^2 where closed, - l^2 / 2k where open; it is open where l + k g >= 0 and the law allows it. The new
+/// psi = l g + k/2 g^2 where closed, - l^2 / 2k where open; it is open where l + k g > 0 and the law allows it. The new
 /// multiplier is psi'.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Augmented {
@@ -24,7 +24,7 @@ impl ContactLaw for Augmented {
     fn response(&self, gap: f64, allows: Allows, multiplier: f64) -> Response {
         let k = self.stiffness;
         let slope = multiplier + k * gap;
-        if allows == Allows::ClosedOrOpen && slope >= 0.0 {
+        if allows == Allows::ClosedOrOpen && slope > 0.0 {
             return Response { energy: -0.5 * multiplier * multiplier / k, ..Response::NONE };
         }
         Response { energy: (multiplier + 0.5 * k * gap) * gap, slope, stiffness: k }

@@ -2,7 +2,7 @@
 
 use super::{Allows, ContactLaw, Response};
 
-/// psi = k/2 g^2, of a contact that may open only for g < 0.
+/// psi = k/2 g^2, of a contact that may open only for g <= 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Penalty {
     /// k, kPa/mm.
@@ -20,7 +20,8 @@ impl ContactLaw for Penalty {
 
     fn response(&self, gap: f64, allows: Allows, _multiplier: f64) -> Response {
         let k = self.stiffness;
-        if allows == Allows::ClosedOrOpen && gap >= 0.0 {
+        // a body that just touches is held: it has nothing else to rest on
+        if allows == Allows::ClosedOrOpen && gap > 0.0 {
             return Response::NONE;
         }
         Response { energy: 0.5 * k * gap * gap, slope: k * gap, stiffness: k }
