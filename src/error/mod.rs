@@ -458,6 +458,20 @@ pub enum Error {
         /// The support in the problem file.
         place: Box<Place>,
     },
+    /// The reference shape is where a sliding or contact does not let it be.
+    #[error("`{name}`: before anything moves, the face has a gap of {gap:.3e} mm to the surface in element {element}, at ({:.2}, {:.2}, {:.2}) mm", position[0], position[1], position[2])]
+    StartsInContact {
+        /// The sliding or contact.
+        name: Box<str>,
+        /// The worst gap, mm; negative behind the surface.
+        gap: f64,
+        /// Where on the face, mm.
+        position: [f64; 3],
+        /// The element of the host.
+        element: usize,
+        /// The contact in the problem file.
+        place: Box<Place>,
+    },
     // ---- S: solver ------------------------------------------------------------------------------------
     /// The factorisation met a pivot that is not a finite number.
     #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
@@ -641,6 +655,7 @@ impl Error {
             Error::ProbeOutside { .. } => "G004",
             Error::SupportsDisagree { .. } => "G005",
             Error::NotNormalToAxis { .. } => "G006",
+            Error::StartsInContact { .. } => "G009",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
@@ -729,6 +744,11 @@ impl Error {
             Error::NotNormalToAxis { .. } => {
                 Some("turn the geometry so that the plane is normal to x, y or z".into())
             }
+            Error::StartsInContact { .. } => Some(
+                "move the surface, or write initial = \"relax\" to take the gap away along the load path (a barrier must \
+                 start in front of its surface)"
+                    .into(),
+            ),
             Error::StepNotSolved { .. } => {
                 Some("scale the problem: give realistic sd_mm, and remove unknowns that no marker sees".into())
             }
@@ -784,6 +804,7 @@ impl Error {
             | Error::ProbeOutside { place, .. }
             | Error::SupportsDisagree { place, .. }
             | Error::NotNormalToAxis { place, .. }
+            | Error::StartsInContact { place, .. }
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }

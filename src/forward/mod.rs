@@ -194,7 +194,11 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), damping: DAMPING, test: Test::Monotone };
+        let limits = Limits {
+            iterations: self.settings.max_iterations.min(NEAR_ITERATIONS),
+            damping: DAMPING,
+            test: Test::Monotone,
+        };
         if let Ok(outcome) = self.solve(guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {

@@ -173,11 +173,16 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             }
             if limits.test == Test::Slope {
                 let left = equations.slope(&step);
-                if left > 0.0 { bracket.1 = (factor, left) } else { bracket.0 = (factor, left) }
+                if left > 0.0 {
+                    bracket.1 = (factor, left)
+                } else {
+                    bracket.0 = (factor, left)
+                }
                 let ((low, before), (high, beyond)) = bracket;
                 // not downhill, or prescribed motion comes with it: nothing to compare with
                 let comparable = slope < 0.0 && !now.outstanding && !then.converged();
-                if comparable && left.abs() > SLOPE_LEFT * slope.abs() && high - low > SHORTEST * high && beyond > 0.0 {
+                if comparable && left.abs() > SLOPE_LEFT * slope.abs() && high - low > SHORTEST * high && beyond > 0.0
+                {
                     // behind a kink the slope is steep: a secant alone would creep up to it
                     let secant = low + (high - low) * before / (before - beyond);
                     factor = secant.clamp(low + 0.25 * (high - low), high - 0.25 * (high - low));

@@ -28,13 +28,8 @@ pub fn contact(
 
 /// All points of the contacts of a model at an equilibrium.
 pub fn contact_points(model: &Model, found: &Equilibrium) -> Vec<ContactPoint> {
-    let mut all = Vec::new();
-    for (term, contact) in model.contacts() {
-        for element in contact.elements() {
-            model.with_own(&found.state, term, element, |at| all.extend(contact.points_at(at)));
-        }
-    }
-    all
+    let of = |(term, contact)| risorius::report::frame::contact_points(model, &found.state, term, contact);
+    model.contacts().flat_map(of).collect()
 }
 
 pub fn solve_to(model: &Model, tolerance: f64) -> (Equilibrium, usize) {
