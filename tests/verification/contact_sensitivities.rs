@@ -5,10 +5,10 @@ use crate::contact_closed_forms::{contact, contact_points};
 use crate::support::{Discretisation, assert_close, model, side};
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Settings, Solver};
-use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
+use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::Model;
 use risorius::model::supports::Support;
 use risorius::term::Term;
@@ -50,9 +50,14 @@ fn check(name: &str, model: &Model, tolerance: f64) -> (usize, usize) {
     let gap = contact_points(model, &found).iter().filter_map(|p| p.gap).fold(f64::INFINITY, f64::min);
     let largest = contact_points(model, &found).iter().filter_map(|p| p.gap).fold(0.0, |m: f64, g| m.max(g.abs()));
     println!("{name}: {now} of {all} points closed, {iterations} iterations, gap {gap:.2e} to {largest:.2e} mm");
-    let du = model.displacement_of(&ours[0]);
-    let theirs = model.displacement_of(&differences[0]);
-    assert_close(name, du.into_iter().flatten(), theirs.into_iter().flatten(), tolerance);
+    // what markers see: the motion of material points. Mixed derivatives at the corner of a contact are hardly determined.
+    let moved = |direction: &[f64]| -> Vec<f64> {
+        let du = model.displacement_of(direction);
+        let place = |k: usize| [k % 3, k / 3 % 3, k / 9].map(|i| i as f64 / 2.0);
+        let at = |element: usize| (0..27).map(move |k| MaterialPoint { element, xi: place(k) });
+        (0..model.mesh().elements()).flat_map(at).flat_map(|point| model.mesh().interpolate(point, &du)).collect()
+    };
+    assert_close(name, moved(&ours[0]), moved(&differences[0]), tolerance);
     (now, all)
 }
 
@@ -73,7 +78,8 @@ fn through_contact_with_a_penalty() {
 #[test]
 fn through_contact_with_multipliers() {
     let meets = |mesh: &Mesh| {
-        let law = Box::new(Augmented { stiffness: 400.0, tolerance: 1e-8 });
+        // stiff: the rounds close weak combinations of points slowly, and differences of equilibria see what is left
+        let law = Box::new(Augmented { stiffness: 4000.0, tolerance: 1e-9 });
         let sphere = Sphere { centre: [44.0, 8.0, -60.8], radius: 60.0, free: FreeSide::Outside };
         contact(mesh, &side(mesh, 2, 0), Allows::ClosedOrOpen, sphere, law)
     };
