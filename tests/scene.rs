@@ -497,6 +497,69 @@ fn regions_and_points_must_lie_in_the_host() {
     }
 }
 
+const CONTACTS: &str = r#"
+[[sliding]]
+face = "xi3=0"
+surface = { reference = true }
+law = { augmented = { kpa_per_mm = 50, gap_mm = 1e-3 } }
+[[sliding]]
+name = "pole"
+face = "xi2=0"
+surface = { cylinder = { through_mm = [0, 1, 2], axis = [0, 0, 2], radius_mm = 9, inside = true } }
+law = { penalty = { kpa_per_mm = 5 } }
+initial = "relax"
+[[contact]]
+face = "xi3=1"
+surface = { plane = { through_mm = [0, 0, 21], normal = [0, 0, -1] } }
+law = { barrier = { kpa_per_mm = 10, range_mm = 0.5 } }
+gauss = 7
+[[contact]]
+face = "xi1=1"
+surface = { sphere = { centre_mm = [90, 10, 10], radius_mm = 29.5 } }
+law = { penalty = { kpa_per_mm = 5 } }
+[[contact]]
+face = "xi1=1"
+surface = { capsule = { from_mm = [90, 0, 10], to_mm = [90, 20, 10], radius_mm = 29.5 } }
+law = { penalty = { kpa_per_mm = 5 } }
+"#;
+
+#[test]
+fn contacts_are_read_and_locked() {
+    let text = WHOLE.to_owned() + CONTACTS;
+    let scene = parse(&text, &[]).unwrap();
+    let names = |list: &[risorius::scene::ContactSpec]| list.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&scene.slidings), ["sliding-1", "pole"]);
+    assert_eq!(names(&scene.contacts), ["contact-1", "contact-2", "contact-3"]);
+    assert_eq!((scene.contacts[0].gauss, scene.contacts[1].gauss), (7, 5));
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!(content(&scene), content(&again));
+    assert_eq!(scene.lock(), again.lock());
+
+    let mistakes = [
+        ("reference = true", "reference = false", "C005"),
+        ("normal = [0, 0, -1]", "normal = [0, 0, 0]", "C005"),
+        ("to_mm = [90, 20, 10]", "to_mm = [90, 0, 10]", "C005"),
+        ("radius_mm = 9,", "radius_mm = 0,", "C005"),
+        ("gauss = 7", "initial = \"relax\"", "C005"),
+        ("gauss = 7", "initial = \"absorb\"", "C006"),
+        (
+            "law = { penalty = { kpa_per_mm = 5 } }\ninitial",
+            "law = { barrier = { kpa_per_mm = 5 } }\ninitial",
+            "C002",
+        ),
+        ("name = \"pole\"", "name = \"sliding-1\"\n[[sliding]]\nname = \"sliding-1\"", "C008"),
+    ];
+    for (good, bad, code) in mistakes {
+        assert!(text.contains(good), "{good}");
+        let error = parse(&text.replacen(good, bad, 1), &[]).unwrap_err();
+        let codes: Vec<&str> = match &error {
+            risorius::Error::Mistakes(all) => all.iter().map(|e| e.code()).collect(),
+            one => vec![one.code()],
+        };
+        assert!(codes.contains(&code), "{bad}: {codes:?} {error}");
+    }
+}
+
 #[test]
 fn files_must_exist_and_curves_are_checked_with_the_problem() {
     let folder = tempfile::tempdir().unwrap();

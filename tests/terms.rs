@@ -7,7 +7,8 @@ use common::{Random, assert_close, curved_block, product};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;
-use risorius::math::tensor::{Matrix, Vector, apply};
+use risorius::math::tensor::{Matrix, Vector, apply, normalised};
+use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
@@ -16,6 +17,9 @@ use risorius::mesh::map::{ElementMap, Term as MapTerm};
 use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
+use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
+use risorius::term::contact::{Contact, Interface};
 use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use risorius::term::muscle::{Activation, Muscle};
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
@@ -77,6 +81,14 @@ fn cases() -> Vec<(String, Model)> {
     single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
     single("muscle with a field of activations", &|mesh| activated(mesh, &Trilinear, Activation::Field(0)));
     single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
+    // gauss = 3: 36 points; the plane and the sphere meet a part of them
+    for (name, allows, surface, law, relax) in contacts() {
+        single(&name, &|mesh| {
+            let faces = &mesh.named_faces["xi3=0"];
+            let interface = Interface { allows, surface: surface(mesh), law: law(), relax };
+            Box::new(Contact::new("contact", interface, mesh, faces, 3))
+        });
+    }
     single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
     single("body force", &|mesh| Box::new(body_force(mesh, [0.01, 0.0, -0.02], 4)));
     let at = MaterialPoint { element: 2, xi: [0.3, 1.0, 0.8] };
@@ -95,6 +107,44 @@ fn whole_surface(mesh: &Mesh) -> Vec<risorius::mesh::face::Face> {
     mesh.named_faces.values().flatten().copied().collect()
 }
 
+type MakeSurface = fn(&Mesh) -> Box<dyn RigidSurface>;
+type MakeLaw = fn() -> Box<dyn ContactLaw>;
+
+/// Every surface with every law: (name, what it allows, surface, law, whether it relaxes).
+fn contacts() -> Vec<(String, Allows, MakeSurface, MakeLaw, bool)> {
+    const FREE: FreeSide = FreeSide::Outside;
+    let surfaces: [(&str, MakeSurface); 5] = [
+        ("plane", |_| Box::new(Plane { through: [10.0, 10.0, 0.7], normal: normalised([0.1, -0.1, 1.0]) })),
+        ("sphere", |_| Box::new(Sphere { centre: [10.0, 9.0, -18.0], radius: 19.0, free: FREE })),
+        ("cylinder", |_| {
+            let axis = normalised([1.0, 0.2, 0.1]);
+            Box::new(Cylinder { through: [0.0, 8.0, -30.0], axis, radius: 30.0, free: FREE })
+        }),
+        ("capsule", |_| {
+            Box::new(Capsule { ends: [[7.0, 8.0, -20.0], [14.0, 9.0, -19.0]], radius: 21.0, free: FREE })
+        }),
+        ("reference", |mesh| Box::new(Patches::new(mesh, &mesh.named_faces["xi3=0"], FreeSide::Inside))),
+    ];
+    let laws: [(&str, MakeLaw); 2] = [
+        ("penalty", || Box::new(Penalty { stiffness: 2.0 })),
+        ("augmented", || Box::new(Augmented { stiffness: 2.0, tolerance: 1e-6 })),
+    ];
+    let mut all = Vec::new();
+    for (surface, make_surface) in surfaces {
+        for (law, make_law) in laws {
+            for (kind, allows) in [("sliding", Allows::Closed), ("contact", Allows::ClosedOrOpen)] {
+                let relax = surface == "sphere";
+                let relaxing = if relax { ", relaxing" } else { "" };
+                all.push((format!("{kind}, {surface}, {law}{relaxing}"), allows, make_surface, make_law, relax));
+            }
+        }
+    }
+    let below: MakeSurface = |_| Box::new(Plane { through: [0.0, 0.0, -8.0], normal: [0.0, 0.0, 1.0] });
+    let barrier: MakeLaw = || Box::new(Barrier { stiffness: 2.0, range: 9.0 });
+    all.push(("contact, plane, barrier".into(), Allows::ClosedOrOpen, below, barrier, false));
+    all
+}
+
 /// A state in which det F stays well above zero: a stretch and a shear with random wiggles, random pressures.
 fn random_state(model: &Model, seed: u64) -> State {
     let mut random = Random::new(seed);
@@ -107,6 +157,7 @@ fn random_state(model: &Model, seed: u64) -> State {
     state.p.iter_mut().for_each(|p| *p = random.next());
     state.controls.iter_mut().enumerate().for_each(|(k, a)| *a = 0.4 / (k + 1) as f64);
     state.load = 0.7;
+    state.multipliers.iter_mut().flatten().for_each(|m| *m = 0.5 * random.next());
     state
 }
 
@@ -165,6 +216,7 @@ fn forces_are_slopes_of_the_energy() {
     for (name, model) in cases() {
         let state = random_state(&model, 31);
         let residual = evaluate(&model, &state).residual;
+        assert!(common::largest(&residual) > 0.0, "{name}: no force to test");
         for v in directions(&model, 32) {
             let power: f64 = residual.iter().zip(&v).map(|(r, v)| r * v).sum();
             let found = slope(|h| vec![energy(&model, &moved(&model, &state, &v, h))], 1e-3)[0];
@@ -217,7 +269,10 @@ fn controls_and_loads_have_their_forces() {
             }
         }
         let (by_load, found_load) = (model.load_force(&state), slope(loads, 0.1));
-        if model.terms()[0].is_load() {
+        if name.ends_with("relaxing") {
+            assert!(common::largest(&by_load) > 0.0, "{name}: the load relaxes it");
+            assert_close(&name, &by_load, &found_load, 1e-10);
+        } else if model.terms()[0].is_load() {
             assert_close(&name, &by_load, &found_load, 1e-12);
             // the work of a load is minus its energy
             let work = model.external_work(&state);
@@ -232,8 +287,9 @@ fn controls_and_loads_have_their_forces() {
 #[test]
 fn rigid_motion_costs_nothing() {
     let mut random = Random::new(36);
+    let own = |model: &Model| model.contacts().next().is_none();
     let free = |name: &str| name.starts_with("tissue") || name.starts_with("muscle") || name == "pressure";
-    for (name, model) in cases().into_iter().filter(|(name, _)| free(name)) {
+    for (name, model) in cases().into_iter().filter(|(name, model)| free(name) && own(model)) {
         let state = random_state(&model, 37);
         let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
         let mut turned = state.clone();
@@ -247,6 +303,36 @@ fn rigid_motion_costs_nothing() {
         let rotated: Vec<Vector> = before.force.iter().map(|f| apply(&turn, *f)).collect();
         assert_close(&name, after.force.as_flattened(), rotated.as_flattened(), 1e-11);
     }
+}
+
+/// A body and its surface that move together keep the energy of their contact, and its forces turn with them.
+#[test]
+fn a_body_moves_with_its_surface() {
+    let mut random = Random::new(38);
+    let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
+    let carry = |mesh: &Mesh, at: &[Vector]| -> Vec<Vector> {
+        let one = |(k, x): (usize, &Vector)| {
+            let rotated = apply(&turn, *x);
+            if mesh.parameter_derivative[k] == 0 { std::array::from_fn(|i| rotated[i] + shift[i]) } else { rotated }
+        };
+        at.iter().enumerate().map(one).collect()
+    };
+    let build = |mesh: Mesh| {
+        let faces = mesh.named_faces["xi3=0"].clone();
+        let surface = Box::new(Patches::new(&mesh, &faces, FreeSide::Inside));
+        let law = Box::new(Penalty { stiffness: 2.0 });
+        let interface = Interface { allows: Allows::Closed, surface, law, relax: false };
+        let term: Box<dyn Term> = Box::new(Contact::new("contact", interface, &mesh, &faces, 3));
+        model(mesh, &pressure::Trilinear, vec![term], Vec::new())
+    };
+    let here = build(host());
+    let there = build(Mesh { parameters: carry(&host(), &host().parameters), ..host() });
+    let state = random_state(&here, 39);
+    let turned_u = state.u.iter().map(|u| apply(&turn, *u)).collect();
+    let (before, after) = (evaluate(&here, &state), evaluate(&there, &State { u: turned_u, ..state.clone() }));
+    assert_close("energy", &after.energies, &before.energies, 1e-11);
+    let rotated: Vec<Vector> = before.force.iter().map(|f| apply(&turn, *f)).collect();
+    assert_close("forces", after.force.as_flattened(), rotated.as_flattened(), 1e-10);
 }
 
 /// At rest the tissue is free of force, and a rigid motion of it has no stiffness.

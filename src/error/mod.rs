@@ -487,6 +487,20 @@ pub enum Error {
         /// The region in the problem file.
         place: Box<Place>,
     },
+    /// The reference shape is where a sliding or contact does not let it be.
+    #[error("`{name}`: before anything moves, the face has a gap of {gap:.3e} mm to the surface in element {element}, at ({:.2}, {:.2}, {:.2}) mm", position[0], position[1], position[2])]
+    StartsInContact {
+        /// The sliding or contact.
+        name: Box<str>,
+        /// The worst gap, mm; negative behind the surface.
+        gap: f64,
+        /// Where on the face, mm.
+        position: [f64; 3],
+        /// The element of the host.
+        element: usize,
+        /// The contact in the problem file.
+        place: Box<Place>,
+    },
     // ---- S: solver ------------------------------------------------------------------------------------
     /// The factorisation met a pivot that is not a finite number.
     #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
@@ -532,6 +546,20 @@ pub enum Error {
         residual: f64,
         /// The norm required, mN.
         required: f64,
+    },
+    /// Multipliers did not close a gap.
+    #[error(
+        "`{name}`: after {rounds} rounds of multipliers a gap of {gap:.2e} mm remains, allowed are {tolerance:.2e} mm"
+    )]
+    GapNotClosed {
+        /// The sliding or contact.
+        name: Box<str>,
+        /// The largest gap that should be zero, mm.
+        gap: f64,
+        /// What may remain, mm.
+        tolerance: f64,
+        /// Rounds done.
+        rounds: usize,
     },
     /// A refined solution of a linear system is not accurate enough.
     #[error(
@@ -667,9 +695,11 @@ impl Error {
             Error::NotNormalToAxis { .. } => "G006",
             Error::PointOutside { .. } => "G020",
             Error::BadRegion { .. } => "G021",
+            Error::StartsInContact { .. } => "G009",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
+            Error::GapNotClosed { .. } => "S006",
             Error::Singular { .. } => "S010",
             Error::FactorTooLarge { .. } => "S011",
             Error::NotFactored => "S012",
@@ -761,6 +791,11 @@ impl Error {
                 Some("turn the geometry so that the plane is normal to x, y or z".into())
             }
             Error::BadRegion { help, .. } => Some((*help).into()),
+            Error::StartsInContact { .. } => Some(
+                "move the surface, or write initial = \"relax\" to take the gap away along the load path (a barrier must \
+                 start in front of its surface)"
+                    .into(),
+            ),
             Error::StepNotSolved { .. } => {
                 Some("scale the problem: give realistic sd_mm, and remove unknowns that no marker sees".into())
             }
@@ -773,6 +808,10 @@ impl Error {
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
             }
+            Error::GapNotClosed { .. } => Some(
+                "raise kpa_per_mm of its law, or gap_mm: the elements may be too large to follow the surface more closely"
+                    .into(),
+            ),
             Error::NotConverged { .. } => Some(
                 "the last equilibrium is kept; let the steps become shorter (--set solver.step_min=1e-6), or try a volumetric \
                  term (tissue.kappa_kpa), a finer mesh where det F is small, a smaller load or activation"
@@ -814,6 +853,7 @@ impl Error {
             | Error::NotNormalToAxis { place, .. }
             | Error::PointOutside { place, .. }
             | Error::BadRegion { place, .. }
+            | Error::StartsInContact { place, .. }
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }

@@ -16,6 +16,9 @@ const STEP_TOLERANCE: f64 = 1e-10;
 /// Relative residual that a solve with the tangent of an equilibrium must reach, and what it strives for.
 const TANGENT_REQUIRED: f64 = 1e-9;
 const TANGENT_TOLERANCE: f64 = 1e-13;
+/// What of B x may remain of the B x without constraint forces, and the iterations for it.
+const CONSTRAINT_TOLERANCE: f64 = 1e-9;
+const CONSTRAINT_ITERATIONS: usize = 500;
 /// Sweeps after which a stale factor is not worth keeping.
 const STALE_SWEEPS: usize = 12;
 
@@ -117,6 +120,48 @@ impl<'m> Balance<'m> {
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);
         self.assemble();
+        self.solve_assembled(rhs, columns)?;
+        if state.multipliers.iter().all(Vec::is_empty) {
+            return Ok(());
+        }
+        let n = self.model.numbering().unknowns();
+        rhs.chunks_exact_mut(n.max(1)).try_for_each(|x| self.hold_constraints(state, x))
+    }
+
+    /// From K^-1 b to the x of K x + B^T z = b, B x = 0: conjugate gradients on B K^-1 B^T z = B K^-1 b. The operator is
+    /// positive on the range of B, and K holds the penalty, which gathers its eigenvalues below 1 / penalty.
+    fn hold_constraints(&mut self, state: &State, x: &mut [f64]) -> Result<()> {
+        let model = self.model;
+        let product = |a: &[Vec<f64>], b: &[Vec<f64>]| -> f64 {
+            a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
+        };
+        let add = |to: &mut [Vec<f64>], scale: f64, from: &[Vec<f64>]| {
+            to.iter_mut().flatten().zip(from.iter().flatten()).for_each(|(t, f)| *t += scale * f);
+        };
+        let mut residual = model.constraint_rate(state, x);
+        let mut direction = residual.clone();
+        let mut square = product(&residual, &residual);
+        let first = square;
+        for _ in 0..CONSTRAINT_ITERATIONS {
+            if square <= CONSTRAINT_TOLERANCE * CONSTRAINT_TOLERANCE * first || first == 0.0 {
+                return Ok(());
+            }
+            let mut moved = model.constraint_force(state, &direction);
+            self.solve_assembled(&mut moved, 1)?;
+            let response = model.constraint_rate(state, &moved);
+            let along = square / product(&direction, &response);
+            x.iter_mut().zip(&moved).for_each(|(x, m)| *x -= along * m);
+            add(&mut residual, -along, &response);
+            let next = product(&residual, &residual);
+            direction.iter_mut().flatten().for_each(|d| *d *= next / square);
+            add(&mut direction, 1.0, &residual);
+            square = next;
+        }
+        Err(Error::InaccurateSolve { residual: (square / first).sqrt(), required: CONSTRAINT_TOLERANCE })
+    }
+
+    /// K x = b with the tangent that is assembled; the last factor is kept where it still serves.
+    fn solve_assembled(&mut self, rhs: &mut [f64], columns: usize) -> Result<()> {
         let original = rhs.to_vec();
         if self.factored {
             let quality = self.factor.solve(&self.matrix, rhs, columns, TANGENT_TOLERANCE)?;
@@ -180,7 +225,8 @@ impl<'m> Balance<'m> {
             let r = residual[self.model.numbering().pressure_unknown(index)];
             sum += (weight * weight - 1.0) * r * r;
         }
-        sum.max(0.0).sqrt()
+        // rounding may leave a sum below zero; a NaN stays one
+        if sum < 0.0 { 0.0 } else { sum.sqrt() }
     }
 }
 
@@ -243,6 +289,10 @@ impl Equations for Balance<'_> {
             }
         }
         next
+    }
+
+    fn slope(&self, step: &Direction) -> f64 {
+        step.unknowns.iter().zip(&self.residual).map(|(d, r)| d * r).sum()
     }
 
     /// Root mean square of displacements over the element size and of pressures over the shear modulus.

@@ -4,8 +4,8 @@ mod balance;
 
 use crate::error::{Error, Result};
 use crate::math::factor;
-use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
-use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, chord, newton};
+use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
+use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, Test, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
 use balance::Balance;
@@ -21,6 +21,8 @@ const CHORD_ITERATIONS: usize = 8;
 const NEAR_ITERATIONS: usize = 8;
 /// Below this length a step onto a saddle is believed.
 const SHORT_FOR_A_JUMP: f64 = 0.02;
+/// Rounds of multipliers before a gap counts as one that does not close.
+const MULTIPLIER_ROUNDS: usize = 200;
 const LONGEST_STEP: f64 = 2.0;
 /// A support rotates by no more than this in one step, radians.
 const LARGEST_ROTATION: f64 = std::f64::consts::PI / 8.0;
@@ -184,16 +186,26 @@ impl<'m> Solver<'m> {
         self.balance.set_target(to.clone());
         let guess = self.balance.at_target(guess.clone());
         if self.balance.has_tangent() {
-            let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0 };
+            let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
             if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
-                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+                let history = vec![step(1.0, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                    return Ok(found);
+                }
             }
         }
-        let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), damping: DAMPING };
-        if let Ok(outcome) = newton(&mut self.balance, guess, limits) {
+        let limits = Limits {
+            iterations: self.settings.max_iterations.min(NEAR_ITERATIONS),
+            damping: DAMPING,
+            test: Test::Monotone,
+        };
+        if let Ok(outcome) = self.solve(guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {
-                return Ok(self.finish(outcome.state, vec![step(1.0, outcome.last, outcome.iterations)]));
+                let history = vec![step(1.0, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                    return Ok(found);
+                }
             }
         }
         self.equilibrium(from, to)
@@ -211,7 +223,7 @@ impl<'m> Solver<'m> {
         let mut last = from.clone();
         let mut before: Option<(f64, State)> = None;
         let mut modes = 0;
-        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING };
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
             let guess = match &before {
@@ -251,7 +263,53 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        Ok(self.finish(last, history))
+        self.balance.set_target(to.clone());
+        self.close_gaps(last, history)
+    }
+
+    /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.
+    fn close_gaps(&mut self, start: State, mut history: Vec<Step>) -> std::result::Result<Equilibrium, Box<Failure>> {
+        let mut state = start;
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        for round in 0.. {
+            let model = self.balance.model;
+            let Some(Renewal { multipliers, term, gap, tolerance }) = model.renew_multipliers(&state) else { break };
+            if gap <= tolerance {
+                break;
+            }
+            let fail = |error: Error, failed: State, last_good: State| {
+                Err(Box::new(Failure { error, last_good, reached: 1.0, failed }))
+            };
+            if round == MULTIPLIER_ROUNDS {
+                let name = model.terms()[term].name().into();
+                let error = Error::GapNotClosed { name, gap, tolerance, rounds: round };
+                return fail(error, state.clone(), state);
+            }
+            let next = State { multipliers, ..state.clone() };
+            let limits_near = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
+            let near = if self.balance.has_tangent() {
+                chord(&mut self.balance, next.clone(), limits_near)
+            } else {
+                Ok(None)
+            };
+            let found = match near {
+                Ok(Some(outcome)) => Ok(outcome),
+                _ => self.solve(next, limits),
+            };
+            match found {
+                Ok(Outcome { state: balanced, last, iterations, stop: None }) => {
+                    history.push(step(1.0, last, iterations));
+                    state = balanced;
+                }
+                Ok(outcome) => {
+                    let error =
+                        self.not_converged(&Stepper::at_end(), outcome.stop.unwrap_or(Stop::Iterations), &outcome);
+                    return fail(error, state, outcome.state);
+                }
+                Err(error) => return fail(error, state.clone(), state),
+            }
+        }
+        Ok(self.finish(state, history))
     }
 
     fn finish(&mut self, state: State, history: Vec<Step>) -> Equilibrium {
@@ -283,12 +341,24 @@ impl<'m> Solver<'m> {
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
     fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
         let guess = self.balance.at_target(guess);
-        let outcome = newton(&mut self.balance, guess, limits)?;
+        let outcome = self.solve(guess, limits)?;
         if outcome.stop == Some(Stop::Inadmissible) {
             let last = self.balance.at_target(last.clone());
-            return newton(&mut self.balance, last, limits);
+            return self.solve(last, limits);
         }
         Ok(outcome)
+    }
+
+    /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side.
+    fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
+        let outcome = newton(&mut self.balance, start, limits)?;
+        if outcome.stop != Some(Stop::NoDescent) || self.balance.model.contacts().next().is_none() {
+            return Ok(outcome);
+        }
+        let mut iterations = outcome.iterations;
+        let rest = newton(&mut self.balance, outcome.state, Limits { test: Test::Slope, ..limits })?;
+        iterations.extend(rest.iterations);
+        Ok(Outcome { iterations, ..rest })
     }
 
     fn not_converged(&self, stepper: &Stepper, stop: Stop, outcome: &Outcome<State>) -> Error {

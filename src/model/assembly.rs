@@ -181,6 +181,7 @@ impl Parts<'_> {
             p: &local.p,
             controls: &state.controls,
             load: state.load,
+            multipliers: &[],
         };
         work.system.clear(want);
         work.energies.clear();
@@ -190,7 +191,8 @@ impl Parts<'_> {
         let mut before = work.system.force;
         for &term in &self.plan.active[element] {
             let start = Instant::now();
-            let contribution = self.terms[term].add(&at, want, &mut work.system);
+            let own = ElementState { multipliers: &state.multipliers[term], ..at };
+            let contribution = self.terms[term].add(&own, want, &mut work.system);
             work.seconds.push(start.elapsed().as_secs_f64());
             work.energies.push(contribution.energy);
             work.det_f = work.det_f.or(contribution.det_f);

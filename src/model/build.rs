@@ -13,10 +13,13 @@ use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    ActivationSpec, BlockSpec, ElementSpec, FaceSpec, FibresSpec, LoadKind, MuscleSpec, PressureSpec, Scene,
-    SupportKind,
+    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ElementSpec, FaceSpec, FibresSpec, InitialSpec, LoadKind,
+    MuscleSpec, PressureSpec, Scene, SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
+use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
+use crate::term::contact::{Contact, Interface};
 use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use crate::term::muscle::{Activation, Muscle, NotEmbedded};
 use crate::term::pressure::{self, PressureSpace};
@@ -83,6 +86,16 @@ pub fn build(scene: &Scene) -> Result<Built> {
             place: Box::new(place.clone()),
         })
     };
+    let slidings = scene.slidings.iter().map(|spec| (spec, Allows::Closed));
+    for (spec, allows) in slidings.chain(scene.contacts.iter().map(|spec| (spec, Allows::ClosedOrOpen))) {
+        match contact(spec, allows, &mesh) {
+            Ok((contact, warning)) => {
+                terms.push(Box::new(contact));
+                warnings.extend(warning);
+            }
+            Err(error) => mistakes.push(error),
+        }
+    }
     for load in &scene.loads {
         terms.push(match &load.kind {
             LoadKind::Traction { face, kpa } => Box::new(traction(&mesh, faces(&mesh, face), *kpa, gauss)),
@@ -185,6 +198,64 @@ fn embed(spec: &MuscleSpec, locator: &Locator<'_>, activation: Activation) -> Re
             place: Box::new(spec.place.clone()),
         },
     })
+}
+
+/// A reference shape that violates a contact by less is taken as rounding, mm.
+const START_TOLERANCE: f64 = 1e-6;
+
+fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, Option<Warning>)> {
+    let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
+    let faces = faces(mesh, &spec.face);
+    let surface: Box<dyn RigidSurface> = match spec.surface {
+        SurfaceSpec::Plane { through_mm, normal } => {
+            Box::new(Plane { through: through_mm, normal: normalised(normal) })
+        }
+        SurfaceSpec::Sphere { centre_mm, radius_mm, inside } => {
+            Box::new(Sphere { centre: centre_mm, radius: radius_mm, free: free(inside) })
+        }
+        SurfaceSpec::Cylinder { through_mm, axis, radius_mm, inside } => {
+            Box::new(Cylinder { through: through_mm, axis: normalised(axis), radius: radius_mm, free: free(inside) })
+        }
+        SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
+            Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
+        }
+        SurfaceSpec::Reference => Box::new(Patches::new(mesh, faces, FreeSide::Inside)),
+    };
+    let law: Box<dyn ContactLaw> = match spec.law {
+        ContactLawSpec::Penalty { kpa_per_mm } => Box::new(Penalty { stiffness: kpa_per_mm }),
+        ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
+            Box::new(Augmented { stiffness: kpa_per_mm, tolerance: gap_mm })
+        }
+        ContactLawSpec::Barrier { kpa_per_mm, range_mm } => {
+            Box::new(Barrier { stiffness: kpa_per_mm, range: range_mm })
+        }
+    };
+    let relax = spec.initial == InitialSpec::Relax;
+    let contact = Contact::new(&spec.name, Interface { allows, surface, law, relax }, mesh, faces, spec.gauss);
+    let Some((at, position, gap)) = contact.worst_start(mesh) else { return Ok((contact, None)) };
+    let barrier = matches!(spec.law, ContactLawSpec::Barrier { .. });
+    let wrong = match allows {
+        Allows::Closed => gap.abs() > START_TOLERANCE,
+        Allows::ClosedOrOpen => gap < -START_TOLERANCE || (barrier && contact.smallest_start() <= 0.0),
+    };
+    if !wrong {
+        return Ok((contact, None));
+    }
+    if !relax {
+        let (name, place) = (spec.name.as_str().into(), Box::new(spec.place.clone()));
+        return Err(Error::StartsInContact { name, gap, position, element: at.element, place });
+    }
+    let warning = Warning {
+        code: "G008",
+        message: format!(
+            "`{}`: the reference shape has a gap of {gap:.3} mm at ({:.2}, {:.2}, {:.2}) mm, which is relaxed along \
+             the load path",
+            spec.name, position[0], position[1], position[2]
+        ),
+        place: Some(spec.place.clone()),
+        help: None,
+    };
+    Ok((contact, Some(warning)))
 }
 
 /// Warns where a muscle has so few quadrature points for the host's elements that the answer depends on where they fall.

@@ -2,12 +2,14 @@
 
 mod assembly;
 pub mod build;
+mod constraints;
 mod numbering;
 mod state;
 pub mod supports;
 mod tissue;
 
 pub use assembly::{Evaluation, Workspace, WorstPoint};
+pub use constraints::Renewal;
 pub use numbering::Numbering;
 pub use state::State;
 
@@ -16,6 +18,7 @@ use crate::math::factor::Symbolic;
 use crate::math::ordering::Ordering;
 use crate::math::sparse::{BlockPattern, SymmetricMatrix};
 use crate::mesh::Mesh;
+use crate::term::contact::Contact;
 use crate::term::muscle::Muscle;
 use crate::term::pressure::PressureSpace;
 use crate::term::{ElementState, Term, Want};
@@ -102,6 +105,11 @@ impl Model {
         self.terms().iter().find(|t| t.as_muscle().is_some() && t.name() == name).map_or(&[], |t| t.controls())
     }
 
+    /// The contacts among the terms, each with its index in [`Model::terms`].
+    pub fn contacts(&self) -> impl Iterator<Item = (usize, &Contact)> {
+        self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_contact()?)))
+    }
+
     /// Inputs in their order in [`State::controls`].
     pub fn controls(&self) -> &[Control] {
         &self.ingredients.controls
@@ -169,6 +177,11 @@ impl Model {
             p: vec![0.0; self.numbering.pressures()],
             controls: vec![0.0; self.controls().len()],
             load: 0.0,
+            multipliers: self
+                .terms()
+                .iter()
+                .map(|t| vec![0.0; t.as_constraint().map_or(0, |c| c.multipliers())])
+                .collect(),
         }
     }
 
@@ -202,7 +215,7 @@ impl Model {
 
     /// dr/d(load) for the unknowns.
     pub fn load_force(&self, state: &State) -> Vec<f64> {
-        self.force_of(state, |term| term.is_load(), |term, at, force| term.add_load_force(at, force))
+        self.force_of(state, |_| true, |term, at, force| term.add_load_force(at, force))
     }
 
     fn force_of(
@@ -211,26 +224,31 @@ impl Model {
         chosen: impl Fn(&dyn Term) -> bool,
         add: impl Fn(&dyn Term, &ElementState<'_>, &mut [[f64; 64]; 3]),
     ) -> Vec<f64> {
-        let terms: Vec<&dyn Term> = self.terms().iter().map(Box::as_ref).filter(|t| chosen(*t)).collect();
+        let terms: Vec<_> = self.terms().iter().map(Box::as_ref).enumerate().filter(|(_, t)| chosen(*t)).collect();
         let mut total = vec![0.0; self.numbering.unknowns()];
         for element in 0..self.mesh().elements() {
-            if !terms.iter().any(|t| t.acts_on(element)) {
+            if !terms.iter().any(|(_, t)| t.acts_on(element)) {
                 continue;
             }
             let mut force = [[0.0; 64]; 3];
             self.with_local(state, element, |at| {
-                for term in terms.iter().filter(|t| t.acts_on(element)) {
-                    add(*term, at, &mut force);
+                for (index, term) in terms.iter().filter(|(_, t)| t.acts_on(element)) {
+                    add(*term, &ElementState { multipliers: &state.multipliers[*index], ..*at }, &mut force);
                 }
             });
-            for run in self.numbering.runs[element].iter().filter(|r| r.local < 192) {
-                for step in 0..run.length {
-                    let local = run.local + step;
-                    total[run.unknown + step] += run.scale * force[local / 64][local % 64];
-                }
-            }
+            self.scatter(element, &force, &mut total);
         }
         total
+    }
+
+    /// Adds the forces on the local parameters of an element to those on the unknowns.
+    fn scatter(&self, element: usize, force: &[[f64; 64]; 3], total: &mut [f64]) {
+        for run in self.numbering.runs[element].iter().filter(|r| r.local < 192) {
+            for step in 0..run.length {
+                let local = run.local + step;
+                total[run.unknown + step] += run.scale * force[local / 64][local % 64];
+            }
+        }
     }
 
     /// Quadrature points of each term in one evaluation.
@@ -239,7 +257,7 @@ impl Model {
         self.terms().iter().map(move |t| active(t.as_ref()))
     }
 
-    /// Calls `f` with the local view of a state in one element.
+    /// Calls `f` with the local view of a state in one element, without the multipliers of any term.
     pub fn with_local<R>(&self, state: &State, element: usize, f: impl FnOnce(&ElementState<'_>) -> R) -> R {
         let local = self.parts().local(state, element);
         f(&ElementState {
@@ -249,6 +267,7 @@ impl Model {
             p: &local.p,
             controls: &state.controls,
             load: state.load,
+            multipliers: &[],
         })
     }
 

@@ -11,4 +11,6 @@ pub struct State {
     pub controls: Vec<f64>,
     /// Factor on loads and prescribed motions.
     pub load: f64,
+    /// Multipliers of each term in the order of the model, kPa; empty for a term that has none.
+    pub multipliers: Vec<Vec<f64>>,
 }

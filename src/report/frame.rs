@@ -1,9 +1,11 @@
 //! What the rows and files of a frame are made from: its number and time, points that are followed, markers with their
 //! measurement, muscles with their stretch.
 
-use crate::math::tensor::{Vector, norm, subtract};
+use crate::math::tensor::{Vector, add_scaled, norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Evaluation, Model, State};
+use crate::term::contact::law::Allows;
+use crate::term::contact::{Contact, ContactPoint};
 
 /// A frame of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +76,23 @@ pub struct MuscleState<'a> {
     pub energy: f64,
 }
 
+/// A sliding or contact at a state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactState<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Reference area that is pressed or held, mm2.
+    pub area: f64,
+    /// Mean pressure over that area, kPa per reference area; negative where the face is held back. 0 without contact.
+    pub mean_pressure: f64,
+    /// Largest pressure, kPa.
+    pub max_pressure: f64,
+    /// Largest penetration, of a sliding the largest gap to either side, mm.
+    pub penetration: f64,
+    /// Force of the surface on the body, mN.
+    pub force: Vector,
+}
+
 /// Probes at a state, in their order.
 pub fn probe_states<'a>(probes: &'a [Probe], model: &Model, state: &State) -> Vec<ProbeState<'a>> {
     let x = model.current(state);
@@ -109,4 +128,42 @@ pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluatio
         }
     };
     model.muscles().map(muscle_state).collect()
+}
+
+/// All slidings and contacts of a model at a state, in the order of its terms.
+pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'m>> {
+    let contact_state = |(term, contact): (usize, &'m Contact)| {
+        let mut sum = ContactState {
+            name: model.terms()[term].name(),
+            area: 0.0,
+            mean_pressure: 0.0,
+            max_pressure: 0.0,
+            penetration: 0.0,
+            force: [0.0; 3],
+        };
+        for point in contact_points(model, state, term, contact) {
+            if point.pressure != 0.0 {
+                sum.area += point.area;
+            }
+            sum.mean_pressure += point.pressure * point.area;
+            sum.max_pressure = sum.max_pressure.max(point.pressure);
+            let gap = point.gap.unwrap_or(0.0);
+            let wrong = if contact.allows() == Allows::Closed { gap.abs() } else { -gap };
+            sum.penetration = sum.penetration.max(wrong);
+            sum.force = add_scaled(sum.force, point.pressure * point.area, point.normal);
+        }
+        // per area in contact
+        sum.mean_pressure /= if sum.area > 0.0 { sum.area } else { 1.0 };
+        sum
+    };
+    model.contacts().map(contact_state).collect()
+}
+
+/// All quadrature points of one contact at a state.
+pub fn contact_points(model: &Model, state: &State, term: usize, contact: &Contact) -> Vec<ContactPoint> {
+    let mut all = Vec::new();
+    for element in contact.elements() {
+        model.with_own(state, term, element, |at| all.extend(contact.points_at(at)));
+    }
+    all
 }

@@ -5,7 +5,7 @@
 //!   status.json, manifest.json          how it stands, what was run on what
 //!   summary.txt                         the page that the terminal showed
 //!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
-//!   view/result.pvd, muscles.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
+//!   view/result.pvd, muscles.pvd, contact.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
 //! ```
 //!
 //! Whole files are written atomically, tables grow frame by frame: a crash or a full disk leaves every finished frame
@@ -23,7 +23,9 @@ pub mod tables;
 pub mod view;
 pub mod vtu;
 
-pub use frame::{Frame, MarkerPair, MuscleState, Probe, ProbeState, muscle_states, probe_states};
+pub use frame::{
+    ContactState, Frame, MarkerPair, MuscleState, Probe, ProbeState, contact_states, muscle_states, probe_states,
+};
 pub use manifest::{Input, Manifest};
 pub use record::Record;
 pub use run_folder::RunFolder;

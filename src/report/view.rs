@@ -3,7 +3,7 @@
 use super::frame::{Frame, MarkerPair};
 use super::pvd::Collection;
 use super::run_folder::RunFolder;
-use super::vtu::{Grid, bezier, linear, markers, muscles};
+use super::vtu::{Grid, bezier, contact, linear, markers, muscles};
 use crate::error::Result;
 use crate::model::{Model, State};
 use std::path::PathBuf;
@@ -15,6 +15,7 @@ pub struct View {
     shape: Series,
     linear: Series,
     muscles: Series,
+    contact: Series,
     markers: Series,
 }
 
@@ -34,12 +35,13 @@ impl View {
             shape: Series::new(folder.clone(), "result"),
             linear: Series::new(folder.join("linear"), "result"),
             muscles: Series::new(folder.clone(), "muscles"),
+            contact: Series::new(folder.clone(), "contact"),
             markers: Series::new(folder.clone(), "markers"),
             folder,
         }
     }
 
-    /// Adds a frame: the exact shape, the resampled one, the muscles if the model has any, the markers if there are any.
+    /// Adds a frame: the exact shape, the resampled one, the muscles and contacts if the model has any, the markers if there are any.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
@@ -48,6 +50,9 @@ impl View {
         self.linear.add(frame, &linear::shape(model, state, frame.time_s))?;
         if model.muscles().next().is_some() {
             self.muscles.add(frame, &muscles::points(model, state, frame.time_s))?;
+        }
+        if model.contacts().next().is_some() {
+            self.contact.add(frame, &contact::points(model, state, frame.time_s))?;
         }
         if !markers.is_empty() {
             self.markers.add(frame, &markers::points(markers, frame.time_s))?;

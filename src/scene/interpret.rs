@@ -1,6 +1,7 @@
 //! From a tree to a scene: which keys there are, what each may hold, and what stands for it when it is absent.
 
 use super::Scene;
+use super::contacts;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
 use super::references::References;
 use super::spec::*;
@@ -25,6 +26,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let regions = file.tables("region", |table| region(table, word));
         let muscles = file.tables("muscle", muscle);
         let supports = file.tables("support", support);
+        let (slidings, contacts) = contacts::both(file);
         let loads = file.tables("load", load);
         let attachments = file.tables("attachment", attachment);
         let controls = file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref()));
@@ -52,6 +54,8 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
             regions: regions?,
             muscles: muscles?,
             supports: supports?,
+            slidings: slidings?,
+            contacts: contacts?,
             loads: loads?,
             attachments: attachments?,
             controls: controls?,
@@ -291,7 +295,7 @@ fn rotate(table: &mut Table) -> Option<SupportKind> {
 }
 
 /// A side of the block: `"xi1=0"` to `"xi3=1"`.
-fn face(table: &mut Table) -> Option<FaceSpec> {
+pub(super) fn face(table: &mut Table) -> Option<FaceSpec> {
     let sides = [0, 1, 2].iter().flat_map(|&direction| [0, 1].map(|end| FaceSpec::BlockSide { direction, end }));
     let sides: Vec<(String, FaceSpec)> = sides.map(|side| (side.to_string(), side)).collect();
     let words: Vec<(&str, FaceSpec)> = sides.iter().map(|(word, side)| (word.as_str(), *side)).collect();

@@ -45,6 +45,8 @@ impl Scene {
             regions,
             muscles,
             supports,
+            slidings,
+            contacts,
             loads,
             attachments,
             controls,
@@ -67,6 +69,8 @@ impl Scene {
         regions.iter().for_each(|region| region_lines(region, &mut lines));
         muscles.iter().for_each(|muscle| muscle_lines(muscle, &mut lines));
         supports.iter().for_each(|support| lines.extend(["\n[[support]]".into(), support_line(&support.kind)]));
+        slidings.iter().for_each(|sliding| contact_lines("sliding", sliding, &mut lines));
+        contacts.iter().for_each(|contact| contact_lines("contact", contact, &mut lines));
         loads.iter().for_each(|load| lines.extend(["\n[[load]]".into(), load_line(&load.kind)]));
         for AttachmentSpec { position_mm, stiffness_mn_per_mm, place: _ } in attachments {
             lines.extend(["\n[[attachment]]".into(), format!("position_mm = {}", numbers(position_mm))]);
@@ -202,6 +206,60 @@ fn support_line(kind: &SupportKind) -> String {
             numbers(through_mm),
             number(*angle_deg)
         ),
+    }
+}
+
+fn contact_lines(kind: &str, contact: &ContactSpec, lines: &mut Vec<String>) {
+    let ContactSpec { name, face, surface, law, initial, gauss, place: _ } = contact;
+    let initial = match initial {
+        InitialSpec::Refuse => "refuse",
+        InitialSpec::Relax => "relax",
+    };
+    lines.extend([
+        format!("\n[[{kind}]]"),
+        format!("name = {}", text(name)),
+        format!("face = \"{face}\""),
+        format!("surface = {{ {} }}", surface_entry(surface)),
+        format!("law = {{ {} }}", law_entry(law)),
+        format!("initial = \"{initial}\""),
+        format!("gauss = {gauss}"),
+    ]);
+}
+
+fn surface_entry(surface: &SurfaceSpec) -> String {
+    let round = |radius: &f64, inside: &bool| format!("radius_mm = {}, inside = {inside}", number(*radius));
+    match surface {
+        SurfaceSpec::Plane { through_mm, normal } => {
+            format!("plane = {{ through_mm = {}, normal = {} }}", numbers(through_mm), numbers(normal))
+        }
+        SurfaceSpec::Sphere { centre_mm, radius_mm, inside } => {
+            format!("sphere = {{ centre_mm = {}, {} }}", numbers(centre_mm), round(radius_mm, inside))
+        }
+        SurfaceSpec::Cylinder { through_mm, axis, radius_mm, inside } => format!(
+            "cylinder = {{ through_mm = {}, axis = {}, {} }}",
+            numbers(through_mm),
+            numbers(axis),
+            round(radius_mm, inside)
+        ),
+        SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => format!(
+            "capsule = {{ from_mm = {}, to_mm = {}, {} }}",
+            numbers(from_mm),
+            numbers(to_mm),
+            round(radius_mm, inside)
+        ),
+        SurfaceSpec::Reference => "reference = true".into(),
+    }
+}
+
+fn law_entry(law: &ContactLawSpec) -> String {
+    match law {
+        ContactLawSpec::Penalty { kpa_per_mm } => format!("penalty = {{ kpa_per_mm = {} }}", number(*kpa_per_mm)),
+        ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
+            format!("augmented = {{ kpa_per_mm = {}, gap_mm = {} }}", number(*kpa_per_mm), number(*gap_mm))
+        }
+        ContactLawSpec::Barrier { kpa_per_mm, range_mm } => {
+            format!("barrier = {{ kpa_per_mm = {}, range_mm = {} }}", number(*kpa_per_mm), number(*range_mm))
+        }
     }
 }
 

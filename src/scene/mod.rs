@@ -7,6 +7,7 @@
 //! [`Scene::read`] reads a file, merges `--set` overrides into it before anything is checked, and [`Scene::lock`]
 //! writes the result with nothing left unsaid.
 
+mod contacts;
 mod cursor;
 mod curves;
 mod interpret;
@@ -50,6 +51,10 @@ pub struct Scene {
     pub muscles: Vec<MuscleSpec>,
     /// What holds or moves its surface.
     pub supports: Vec<SupportSpec>,
+    /// Faces that stay on a surface and slide along it.
+    pub slidings: Vec<ContactSpec>,
+    /// Faces that stay before a surface and may lift off.
+    pub contacts: Vec<ContactSpec>,
     /// The forces on it.
     pub loads: Vec<LoadSpec>,
     /// Points of it that springs hold.
@@ -127,7 +132,7 @@ fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], o
         }
         flatten_controls(&mut root);
     }
-    for kind in ["muscle", "region", "probe", "marker"] {
+    for kind in ["muscle", "region", "probe", "marker", "sliding", "contact"] {
         unique_names(&root, kind, &mistakes);
     }
     let references = References::new(&root, &folder, on_disk);

@@ -267,6 +267,107 @@ impl std::fmt::Display for FaceSpec {
     }
 }
 
+/// Contact of a face with a rigid surface, without friction: `[[sliding]]` or `[[contact]]`.
+#[derive(Debug, Clone, Serialize)]
+pub struct ContactSpec {
+    /// Its name in tables, unique; by default its kind and number.
+    pub name: String,
+    /// The face.
+    pub face: FaceSpec,
+    /// What it meets.
+    pub surface: SurfaceSpec,
+    /// What keeps the gap.
+    pub law: ContactLawSpec,
+    /// What becomes of a reference shape that violates it.
+    pub initial: InitialSpec,
+    /// Gauss points per direction and element face, 2 to 12.
+    pub gauss: usize,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A rigid surface: `surface` of a contact.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceSpec {
+    /// A plane.
+    Plane {
+        /// A point of it, mm.
+        through_mm: [f64; 3],
+        /// Towards the free side; any length but 0.
+        normal: [f64; 3],
+    },
+    /// A sphere.
+    Sphere {
+        /// Its centre, mm.
+        centre_mm: [f64; 3],
+        /// Its radius, mm.
+        radius_mm: f64,
+        /// Whether the body is inside.
+        inside: bool,
+    },
+    /// A cylinder without ends.
+    Cylinder {
+        /// A point of the axis, mm.
+        through_mm: [f64; 3],
+        /// Along the axis; any length but 0.
+        axis: [f64; 3],
+        /// Its radius, mm.
+        radius_mm: f64,
+        /// Whether the body is inside.
+        inside: bool,
+    },
+    /// A cylinder between two points, with half spheres as its ends.
+    Capsule {
+        /// One end of the axis, mm.
+        from_mm: [f64; 3],
+        /// The other end, mm.
+        to_mm: [f64; 3],
+        /// Its radius, mm.
+        radius_mm: f64,
+        /// Whether the body is inside.
+        inside: bool,
+    },
+    /// The face itself, where it was before anything moved; the body is on its own side of it.
+    Reference,
+}
+
+/// A law of contact: `law` of a contact.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactLawSpec {
+    /// A spring per area.
+    Penalty {
+        /// Its stiffness.
+        kpa_per_mm: f64,
+    },
+    /// A spring per area about multipliers that close the gap.
+    Augmented {
+        /// Its stiffness.
+        kpa_per_mm: f64,
+        /// The gap that may remain, mm.
+        gap_mm: f64,
+    },
+    /// A barrier that is never passed; not for sliding.
+    Barrier {
+        /// Its stiffness.
+        kpa_per_mm: f64,
+        /// The gap at which it begins, mm.
+        range_mm: f64,
+    },
+}
+
+/// What becomes of a reference shape that violates a contact: `initial` of a contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InitialSpec {
+    /// It is a mistake.
+    Refuse,
+    /// The violation is taken away along the load path.
+    Relax,
+}
+
 /// A force on the body: `[[load]]`.
 #[derive(Debug, Clone, Serialize)]
 pub struct LoadSpec {

@@ -28,6 +28,9 @@ pub trait Equations {
     /// The state at `factor` along a step.
     fn advance(&self, state: &Self::State, step: &Self::Step, factor: f64) -> Self::State;
 
+    /// step . r at the state last assessed: the slope of the energy along the step.
+    fn slope(&self, step: &Self::Step) -> f64;
+
     /// The size of a + weight b, dimensionless; a step of size one is large.
     fn size(&self, a: &Self::Step, weight: f64, b: &Self::Step) -> f64;
 }
@@ -58,7 +61,24 @@ pub struct Limits {
     pub iterations: usize,
     /// The smallest damping factor before giving up.
     pub damping: f64,
+    /// The test that steps must pass.
+    pub test: Test,
 }
+
+/// A test of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Test {
+    /// Natural monotonicity, for smooth equations.
+    Monotone,
+    /// The slope d . r of the energy along the step must have lost a part of its size, for equations with kinks. Just
+    /// before a kink no step is monotone, however short; this search ends behind it, where the tangent is another.
+    Slope,
+}
+
+/// Part of the slope that may remain.
+const SLOPE_LEFT: f64 = 0.5;
+/// Part of the step at which the search for it ends.
+const SHORTEST: f64 = 1e-3;
 
 /// One iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,17 +142,20 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
         }
         let step = equations.step(&state)?;
         let length = equations.size(&step, 0.0, &step);
+        let slope = equations.slope(&step);
         // the a-priori factor: how far the last tangent could be trusted
         let mut factor = 1.0;
         if let Some((last, last_factor, correction)) = &previous {
             let change = equations.size(correction, -1.0, &step);
             let trust = equations.size(last, 0.0, last) * equations.size(correction, 0.0, correction) * last_factor
                 / (change * length);
-            if trust.is_finite() {
+            if limits.test == Test::Monotone && trust.is_finite() {
                 factor = trust.clamp(limits.damping, 1.0);
             }
         }
         let mut accepted: Option<(E::State, Assessment, E::Step, f64)> = None;
+        // factors with their slopes: still downhill, uphill again
+        let mut bracket = ((0.0, slope), (factor, 0.0));
         loop {
             let trial = equations.advance(&state, &step, factor);
             let then = equations.assess(&trial);
@@ -147,6 +170,27 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
                     break;
                 }
                 continue;
+            }
+            if limits.test == Test::Slope {
+                let left = equations.slope(&step);
+                if left > 0.0 {
+                    bracket.1 = (factor, left)
+                } else {
+                    bracket.0 = (factor, left)
+                }
+                let ((low, before), (high, beyond)) = bracket;
+                // not downhill, or prescribed motion comes with it: nothing to compare with
+                let comparable = slope < 0.0 && !now.outstanding && !then.converged();
+                if comparable && left.abs() > SLOPE_LEFT * slope.abs() && high - low > SHORTEST * high && beyond > 0.0
+                {
+                    // behind a kink the slope is steep: a secant alone would creep up to it
+                    let secant = low + (high - low) * before / (before - beyond);
+                    factor = secant.clamp(low + 0.25 * (high - low), high - 0.25 * (high - low));
+                    continue;
+                }
+                let correction = equations.correction()?;
+                accepted = Some((trial, then, correction, factor));
+                break;
             }
             let correction = equations.correction()?;
             let theta = equations.size(&correction, 0.0, &correction) / length;

@@ -27,6 +27,11 @@ impl Stepper {
         Stepper { limits, reached: 0.0, length: limits.first.min(limits.max).min(1.0), cuts: 0 }
     }
 
+    /// At the end of a path.
+    pub fn at_end() -> Stepper {
+        Stepper { limits: StepLimits { first: 0.0, max: 0.0, min: 0.0 }, reached: 1.0, length: 0.0, cuts: 0 }
+    }
+
     /// The place on the path where the last solution is.
     pub fn reached(&self) -> f64 {
         self.reached

@@ -3,6 +3,8 @@
 //! All terms are sums over the elements of the host: a term adds its energy, its force r = dPi/d(u, p) and its
 //! stiffness K = dr/d(u, p) to the small system of one element, which the model then assembles.
 
+pub mod constraint;
+pub mod contact;
 pub mod load;
 pub mod muscle;
 pub mod pressure;
@@ -29,6 +31,8 @@ pub struct ElementState<'a> {
     pub controls: &'a [f64],
     /// Factor on loads, 0 to 1 along the load path.
     pub load: f64,
+    /// The multipliers of the term that is asked, over all elements; empty for a term that has none.
+    pub multipliers: &'a [f64],
 }
 
 /// How much a term is asked for.
@@ -121,7 +125,7 @@ pub trait Term: Send + Sync {
     /// Adds dr/d(control), the force per unit of a control (for an activation: mN), in one element.
     fn add_control_force(&self, _control: usize, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
-    /// Adds dr/d(load) in one element. Zero unless the term is a load.
+    /// Adds dr/d(load) in one element. Zero for a term that does not depend on the load factor.
     fn add_load_force(&self, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
     /// Work of a load on the straight way to the current displacement, uJ; zero for everything that is not one.
@@ -139,6 +143,16 @@ pub trait Term: Send + Sync {
 
     /// The term as a muscle, if it is one: its fibres are shown in results.
     fn as_muscle(&self) -> Option<&muscle::Muscle> {
+        None
+    }
+
+    /// The term as a contact, if it is one: its pressure is shown in results.
+    fn as_contact(&self) -> Option<&contact::Contact> {
+        None
+    }
+
+    /// The term as a constraint, if it has multipliers.
+    fn as_constraint(&self) -> Option<&dyn constraint::Constraint> {
         None
     }
 }

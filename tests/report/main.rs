@@ -1,5 +1,6 @@
 //! What a run leaves behind: is it whole, is it exact, and does it survive a crash?
 
+mod contact;
 mod files;
 mod model;
 mod shapes;

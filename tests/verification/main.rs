@@ -3,9 +3,12 @@
 mod activation_field;
 mod bars_and_springs;
 mod cardiac_beam;
+mod contact_closed_forms;
+mod contact_sensitivities;
 mod cooks_membrane;
 mod cylinder_inflation;
 mod free_contraction;
+mod hertz;
 mod patch_test;
 mod prescribed_state;
 mod rivlin_torsion;

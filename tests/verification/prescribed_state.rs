@@ -168,6 +168,7 @@ fn energy_residual_tangent_and_activation_force_agree() {
             p: reference.p.clone(),
             controls: reference.activations.clone(),
             load: 1.0,
+            ..model.rest()
         };
         let mut workspace = Workspace::default();
         let found = model.evaluate(&state, Want::Stiffness, None, &mut workspace);

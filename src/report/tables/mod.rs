@@ -4,6 +4,7 @@
 //! is an empty cell. The rows of a frame are written at once; where that fails the table ends with the frame before.
 
 mod activations;
+mod contact;
 mod convergence;
 mod cost;
 mod energies;
@@ -13,6 +14,7 @@ mod muscles;
 mod probes;
 
 pub use activations::ActivationTable;
+pub use contact::ContactTable;
 pub use convergence::ConvergenceTable;
 pub use cost::write_cost;
 pub use energies::EnergyTable;

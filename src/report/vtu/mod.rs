@@ -1,6 +1,7 @@
 //! VTU: unstructured grids as ParaView reads them, one kind of shape per file.
 
 pub mod bezier;
+pub mod contact;
 pub mod grid;
 pub mod linear;
 pub mod markers;

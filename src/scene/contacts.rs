@@ -1,0 +1,133 @@
+//! `[[sliding]]` and `[[contact]]`: a face, the surface it meets, and the law between them.
+
+use super::cursor::{FINITE, Item, POSITIVE, Reader, Table};
+use super::interpret::face;
+use super::spec::*;
+
+type Contacts = Option<Vec<ContactSpec>>;
+
+/// All slidings and all contacts of a file.
+pub(super) fn both(file: &mut Table) -> (Contacts, Contacts) {
+    let slidings = numbered(file, "sliding", &[("penalty", penalty), ("augmented", augmented)]);
+    let contacts = numbered(file, "contact", &[("penalty", penalty), ("augmented", augmented), ("barrier", barrier)]);
+    (slidings, contacts)
+}
+
+type LawReader<'a> = (&'static str, Reader<'a, ContactLawSpec>);
+
+/// The tables `[[kind]]` of contacts; one without a name is called by its kind and number.
+fn numbered<'a>(file: &mut Table<'a>, kind: &'static str, laws: &[LawReader<'a>]) -> Option<Vec<ContactSpec>> {
+    let mut number = 0;
+    file.tables(kind, |table| {
+        number += 1;
+        contact(table, &format!("{kind}-{number}"), laws)
+    })
+}
+
+fn contact<'a>(table: &mut Table<'a>, default_name: &str, laws: &[LawReader<'a>]) -> Option<ContactSpec> {
+    let name = table.or("name", default_name.to_owned(), |item| item.name());
+    let face = face(table);
+    let surface =
+        table.required("surface", "surface = { plane = { through_mm = [0, 0, 0], normal = [0, 0, 1] } }", |item| {
+            item.table(surface)
+        });
+    let law = table
+        .required("law", "law = { penalty = { kpa_per_mm = 10 } }", |item| item.table(|table| table.one_of(laws)));
+    let initials = [("refuse", InitialSpec::Refuse), ("relax", InitialSpec::Relax)];
+    let initial = table.or("initial", InitialSpec::Refuse, |item| match item.choice(&initials, &[])? {
+        InitialSpec::Relax if matches!(law, Some(ContactLawSpec::Barrier { .. })) => {
+            item.out_of_range("\"relax\"", "\"refuse\" with a barrier, behind which nothing can start")
+        }
+        initial => Some(initial),
+    });
+    let gauss = table.or("gauss", 5, |item| item.whole(2, 12));
+    Some(ContactSpec {
+        name: name?,
+        face: face?,
+        surface: surface?,
+        law: law?,
+        initial: initial?,
+        gauss: gauss?,
+        place: table.place(),
+    })
+}
+
+fn surface(table: &mut Table) -> Option<SurfaceSpec> {
+    let reference: Reader<SurfaceSpec> = |item| match item.flag()? {
+        true => Some(SurfaceSpec::Reference),
+        false => item.out_of_range("false", "true, or another surface"),
+    };
+    table.one_of(&[
+        ("plane", |item| item.table(plane)),
+        ("sphere", |item| item.table(sphere)),
+        ("cylinder", |item| item.table(cylinder)),
+        ("capsule", |item| item.table(capsule)),
+        ("reference", reference),
+    ])
+}
+
+fn plane(table: &mut Table) -> Option<SurfaceSpec> {
+    let through_mm = table.required("through_mm", "through_mm = [0, 0, 0]", |item| item.numbers(FINITE));
+    let normal = table.required("normal", "normal = [0, 0, 1]", direction);
+    Some(SurfaceSpec::Plane { through_mm: through_mm?, normal: normal? })
+}
+
+fn sphere(table: &mut Table) -> Option<SurfaceSpec> {
+    let centre_mm = table.required("centre_mm", "centre_mm = [0, 0, 0]", |item| item.numbers(FINITE));
+    let (radius_mm, inside) = round(table);
+    Some(SurfaceSpec::Sphere { centre_mm: centre_mm?, radius_mm: radius_mm?, inside: inside? })
+}
+
+fn cylinder(table: &mut Table) -> Option<SurfaceSpec> {
+    let through_mm = table.required("through_mm", "through_mm = [0, 0, 0]", |item| item.numbers(FINITE));
+    let axis = table.required("axis", "axis = [1, 0, 0]", direction);
+    let (radius_mm, inside) = round(table);
+    Some(SurfaceSpec::Cylinder { through_mm: through_mm?, axis: axis?, radius_mm: radius_mm?, inside: inside? })
+}
+
+fn capsule(table: &mut Table) -> Option<SurfaceSpec> {
+    let from_mm = table.required("from_mm", "from_mm = [0, 0, 0]", |item| item.numbers(FINITE));
+    let to_mm = table.required("to_mm", "to_mm = [10, 0, 0]", |item| match item.numbers(FINITE)? {
+        to if Some(to) == from_mm => item.out_of_range(&format!("{to:?}"), "another point than from_mm"),
+        to => Some(to),
+    });
+    let (radius_mm, inside) = round(table);
+    Some(SurfaceSpec::Capsule { from_mm: from_mm?, to_mm: to_mm?, radius_mm: radius_mm?, inside: inside? })
+}
+
+/// What all round surfaces have.
+fn round(table: &mut Table) -> (Option<f64>, Option<bool>) {
+    let radius_mm = table.required("radius_mm", "radius_mm = 20", |item| item.number(POSITIVE));
+    (radius_mm, table.or("inside", false, |item| item.flag()))
+}
+
+fn direction(item: Item) -> Option<[f64; 3]> {
+    match item.numbers(FINITE)? {
+        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
+        direction => Some(direction),
+    }
+}
+
+fn stiffness(table: &mut Table) -> Option<f64> {
+    table.required("kpa_per_mm", "kpa_per_mm = 10", |item| item.number(POSITIVE))
+}
+
+fn penalty(item: Item) -> Option<ContactLawSpec> {
+    item.table(|table| Some(ContactLawSpec::Penalty { kpa_per_mm: stiffness(table)? }))
+}
+
+fn augmented(item: Item) -> Option<ContactLawSpec> {
+    item.table(|table| {
+        let kpa_per_mm = stiffness(table);
+        let gap_mm = table.required("gap_mm", "gap_mm = 1e-3", |item| item.number(POSITIVE));
+        Some(ContactLawSpec::Augmented { kpa_per_mm: kpa_per_mm?, gap_mm: gap_mm? })
+    })
+}
+
+fn barrier(item: Item) -> Option<ContactLawSpec> {
+    item.table(|table| {
+        let kpa_per_mm = stiffness(table);
+        let range_mm = table.required("range_mm", "range_mm = 0.1", |item| item.number(POSITIVE));
+        Some(ContactLawSpec::Barrier { kpa_per_mm: kpa_per_mm?, range_mm: range_mm? })
+    })
+}

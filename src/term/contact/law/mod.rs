@@ -1,0 +1,54 @@
+//! FAMILY of contact laws: the energy per reference area that keeps a gap closed, or open.
+//!
+//! psi(g) has the slope psi' = - pressure (kPa) and the curvature psi'' >= 0 (kPa/mm). To add a law: one file here, its line
+//! in the scene, and its case in the conformance tests.
+
+mod augmented;
+mod barrier;
+mod penalty;
+
+pub use augmented::Augmented;
+pub use barrier::Barrier;
+pub use penalty::Penalty;
+
+/// Which gaps a law allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Allows {
+    /// g = 0: the body stays on the surface and slides along it.
+    Closed,
+    /// g >= 0: the body may lift off.
+    ClosedOrOpen,
+}
+
+/// psi and its derivatives by the gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Response {
+    /// psi, kPa mm.
+    pub energy: f64,
+    /// psi', kPa: minus the pressure.
+    pub slope: f64,
+    /// psi'', kPa/mm.
+    pub stiffness: f64,
+}
+
+impl Response {
+    /// No contact.
+    pub const NONE: Response = Response { energy: 0.0, slope: 0.0, stiffness: 0.0 };
+}
+
+/// A law of frictionless contact.
+pub trait ContactLaw: Send + Sync + std::fmt::Debug {
+    /// The name used in problem files.
+    fn name(&self) -> &'static str;
+
+    /// The response to a gap (mm) with a multiplier (kPa); NaN where the law does not admit the gap.
+    fn response(&self, gap: f64, allows: Allows, multiplier: f64) -> Response;
+
+    /// Its stiffness k, kPa/mm.
+    fn stiffness(&self) -> f64;
+
+    /// The gap (mm) to which multipliers close a gap that should be zero; `None` for a law that has no multipliers.
+    fn gap_tolerance(&self) -> Option<f64> {
+        None
+    }
+}
