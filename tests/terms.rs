@@ -97,7 +97,8 @@ fn cases() -> Vec<(String, Model)> {
     single("springs along the normal", &|mesh| {
         Box::new(Springs::foundation(mesh, &mesh.named_faces["xi1=0"], 0.3, Resists::Normal, 4))
     });
-    single("attachment", &|mesh| Box::new(Springs::attachment(mesh, at, 12.0)));
+    let other = MaterialPoint { element: 0, xi: [0.0, 0.0, 0.5] };
+    single("attachments", &|mesh| Box::new(Springs::attachments(mesh, &[(at, 12.0), (other, 5.0)])));
     // a pressure has an energy where its surface is closed
     single("pressure", &|mesh| Box::new(FollowerPressure::new(mesh, &whole_surface(mesh), 0.3, 6)));
     all

@@ -119,11 +119,15 @@ pub fn build(scene: &Scene) -> Result<Built> {
             }
         });
     }
+    let mut ties = Vec::new();
     for attachment in &scene.attachments {
         match point(attachment.position_mm, "the attachment", &attachment.place) {
-            Ok(at) => terms.push(Box::new(Springs::attachment(&mesh, at, attachment.stiffness_mn_per_mm))),
+            Ok(at) => ties.push((at, attachment.stiffness_mn_per_mm)),
             Err(error) => mistakes.push(error),
         }
+    }
+    if !ties.is_empty() {
+        terms.push(Box::new(Springs::attachments(&mesh, &ties)));
     }
     let mut probes = Vec::new();
     for probe in &scene.probes {

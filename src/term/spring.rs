@@ -1,4 +1,4 @@
-//! Springs from material points to where they were at rest: a foundation under faces, or an attachment of one point.
+//! Springs from material points to where they were at rest: a foundation under faces, or attachments of single points.
 //!
 //! Pi = sum over points 1/2 u . k u with a symmetric matrix k, so that
 //!   dPi/du_ia = sum k_ij u_j N_a,   d2Pi/du du = sum k_ij N_a N_b
@@ -59,11 +59,13 @@ impl Springs {
         Springs { name: "spring", points }
     }
 
-    /// One spring of `stiffness` in mN/mm at a material point.
-    pub fn attachment(mesh: &Mesh, at: MaterialPoint, stiffness: f64) -> Springs {
+    /// A spring at each of some material points, its stiffness in mN/mm.
+    pub fn attachments(mesh: &Mesh, ties: &[(MaterialPoint, f64)]) -> Springs {
         let mut points: Vec<Vec<Spring>> = (0..mesh.elements()).map(|_| Vec::new()).collect();
-        let stiffness = IDENTITY.map(|row| row.map(|d| stiffness * d));
-        points[at.element].push(Spring { values: mesh.element.values(at.xi), stiffness });
+        for (at, stiffness) in ties {
+            let stiffness = IDENTITY.map(|row| row.map(|d| stiffness * d));
+            points[at.element].push(Spring { values: mesh.element.values(at.xi), stiffness });
+        }
         Springs { name: "attachment", points }
     }
 }

@@ -10,7 +10,7 @@
 //! that; Newton's method comes to it a little more slowly, and sensitivities from the tangent are approximate.
 //!
 //! The work told is that of the pressure on the straight way from X to x = X + u,
-//!   - load p sum w u . (da(X) + 4 da(X + u/2) + da(x))/6,
+//!   W = - load p sum w u . (da(X) + 4 da(X + u/2) + da(x))/6,
 //! which is exact, for da is quadratic along it; the energy is its opposite. Both depend on the way at a free rim alone.
 
 use crate::material::PAIRS;
