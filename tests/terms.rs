@@ -8,7 +8,6 @@ use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;
 use risorius::math::tensor::{Matrix, Vector, apply, normalised};
-use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
