@@ -129,15 +129,15 @@ fn patches_find_the_closest_point() {
     }
 }
 
-/// Beyond the edge of the set the patches go on for half an element, and then there is nothing.
+/// Beyond the edge of the set the patches go on for an element, and then there is nothing.
 #[test]
-fn patches_end_half_an_element_beyond_their_edge() {
+fn patches_end_an_element_beyond_their_edge() {
     let mesh = block(&TricubicHermite, [0.0; 3], [20.0, 10.0, 10.0], [2, 1, 1]);
     let top = Patches::new(&mesh, &mesh.named_faces["xi3=1"], FreeSide::Outside);
-    for (x, there) in [(-4.9, true), (-5.1, false), (24.9, true), (25.1, false)] {
+    for (x, there) in [(-9.9, true), (-10.1, false), (29.9, true), (30.1, false)] {
         assert_eq!(top.gap([x, 5.0, 11.0]).is_some(), there, "x = {x}");
     }
-    assert!(top.gap([10.0, 14.9, 11.0]).is_some() && top.gap([10.0, 15.1, 11.0]).is_none());
+    assert!(top.gap([10.0, 19.9, 11.0]).is_some() && top.gap([10.0, 20.1, 11.0]).is_none());
     assert!(top.gap([f64::NAN, 5.0, 11.0]).is_none());
 }
 
@@ -201,5 +201,22 @@ fn gaps_move_with_their_surface() {
         let (here, there) = (gap(&before, x), gap(&after, moved(x)));
         assert!((here.value - there.value).abs() < 1e-11);
         assert!((dot(apply(&turn, here.normal), there.normal) - 1.0).abs() < 1e-12);
+    }
+}
+
+/// On a flat set of patches the gap is the height, also where a point is about to cross from one patch to the next.
+#[test]
+fn patches_have_no_seams() {
+    let mesh = block(&TricubicHermite, [0.0; 3], [60.0, 20.0, 20.0], [6, 2, 2]);
+    let bottom = Patches::new(&mesh, &mesh.named_faces["xi3=0"], FreeSide::Inside);
+    let mut random = Random::new(56);
+    for n in 0..20_000 {
+        // every other point within 1e-3 to 1e-13 mm of an edge between patches
+        let near = 10.0_f64.powf(random.between(-13.0, -3.0)) * random.next();
+        let x = if n % 2 == 0 { 10.0 * (n / 2 % 7) as f64 + near } else { random.between(-4.0, 64.0) };
+        let z = random.between(-0.2, 0.2);
+        let at = [x, random.between(-4.0, 24.0), z];
+        let found = bottom.gap(at).unwrap_or_else(|| panic!("no gap at {at:?}"));
+        assert!((found.value - z).abs() < 1e-12, "{at:?}: {}", found.value);
     }
 }

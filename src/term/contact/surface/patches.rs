@@ -3,7 +3,7 @@
 //! The foot of x on a patch y(s, t) makes |y - x| stationary: y_a . (y - x) = 0. With the metric m_ab = y_a . y_b and the
 //! curvature k_ab = n . y_ab of the surface along its normal n,
 //!   g = n . (x - y),  dg/dx = n,  d2g/dx2 = - A m^-1 k (m - g k)^-1 A^T,  A = [y_s y_t]
-//! Where the set has an edge, the patches go on beyond it by half an element as the polynomials that they are; further
+//! Where the set has an edge, the patches go on beyond it by one element as the polynomials that they are; further
 //! out there is no surface.
 
 use super::{FreeSide, Gap, RigidSurface};
@@ -17,7 +17,7 @@ use rstar::{PointDistance, RTree};
 use std::collections::HashMap;
 
 /// How far a patch goes on beyond an edge of the whole set, in element lengths.
-const BEYOND: f64 = 0.5;
+const BEYOND: f64 = 1.0;
 /// A step below this is taken as Newton's method gives it: the distance no longer tells better from worse.
 const LOCAL: f64 = 1e-3;
 
