@@ -8,12 +8,14 @@ use crate::material::{Law, MooneyRivlin};
 use crate::math::tensor::{norm, normalised};
 use crate::mesh::block::block;
 use crate::mesh::element::{TricubicHermite, Trilinear};
-use crate::mesh::face::Face;
+use crate::mesh::exf::{ExFile, Geometry};
+use crate::mesh::face::{Face, boundary_faces};
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    BlockSpec, ElementSpec, FaceSpec, FibresSpec, LawSpec, LoadKind, MuscleSpec, PressureSpec, Scene, SupportKind,
+    BlockSpec, ElementSpec, FaceName, FaceSpec, FibresSpec, GeometrySpec, LawSpec, LoadKind, MeshSpec, MuscleSpec,
+    PressureSpec, Scene, SupportKind,
 };
 use crate::term::Term;
 use crate::term::load::{gravity, traction};
@@ -40,7 +42,7 @@ const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
 /// All geometric mistakes of the scene at once, each with its place: inverted elements, muscles or probes outside the
 /// host, supports that contradict each other.
 pub fn build(scene: &Scene) -> Result<Built> {
-    let mesh = host(&scene.mesh.block);
+    let mesh = host(&scene.mesh)?;
     let space: &'static dyn PressureSpace = match scene.tissue.pressure {
         PressureSpec::Trilinear => &pressure::Trilinear,
         PressureSpec::DiscontinuousTrilinear => &pressure::DiscontinuousTrilinear,
@@ -66,7 +68,8 @@ pub fn build(scene: &Scene) -> Result<Built> {
     for (index, spec) in scene.muscles.iter().enumerate() {
         match embed(spec, &locator, index) {
             Ok(muscle) => {
-                warnings.extend(coarse_rule(spec, &scene.mesh.block));
+                let host_element = volume / mesh.elements() as f64;
+                warnings.extend(coarse_rule(spec, &scene.mesh.geometry, &muscle, host_element));
                 terms.push(Box::new(muscle));
             }
             Err(error) => mistakes.push(error),
@@ -80,12 +83,15 @@ pub fn build(scene: &Scene) -> Result<Built> {
         });
     }
     for load in &scene.loads {
-        terms.push(match &load.kind {
-            LoadKind::Traction { face, kpa } => Box::new(traction(&mesh, faces(&mesh, face), *kpa, gauss)),
+        match &load.kind {
+            LoadKind::Traction { face, kpa } => match faces(scene, &mesh, face, &load.place) {
+                Ok(faces) => terms.push(Box::new(traction(&mesh, &faces, *kpa, gauss))),
+                Err(error) => mistakes.push(error),
+            },
             LoadKind::Gravity { density_kg_m3, acceleration_m_s2 } => {
-                Box::new(gravity(&mesh, *density_kg_m3, *acceleration_m_s2, gauss))
+                terms.push(Box::new(gravity(&mesh, *density_kg_m3, *acceleration_m_s2, gauss)));
             }
-        });
+        }
     }
     let mut probes = Vec::new();
     for probe in &scene.probes {
@@ -114,23 +120,74 @@ pub fn build(scene: &Scene) -> Result<Built> {
     Ok(Built { model, probes, warnings })
 }
 
-fn host(spec: &BlockSpec) -> Mesh {
-    block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)
+fn host(spec: &MeshSpec) -> Result<Mesh> {
+    match &spec.geometry {
+        GeometrySpec::Block(spec) => Ok(block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)),
+        GeometrySpec::Exf(exf) => {
+            let Geometry { mesh, field, .. } = ExFile::read(&exf.path)?.geometry(exf.field.as_deref())?;
+            if mesh.element.parameters_per_node() == 8 {
+                return Ok(mesh);
+            }
+            Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
+        }
+    }
 }
 
-fn faces<'m>(mesh: &'m Mesh, spec: &FaceSpec) -> &'m [Face] {
-    mesh.named_faces.get(&spec.to_string()).map_or(&[], Vec::as_slice)
+/// The faces with any of the names, each once, in order.
+fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) -> Result<Vec<Face>> {
+    let mut all = Vec::new();
+    for name in names {
+        let named = match name {
+            FaceName::Boundary => boundary_faces(mesh),
+            name => mesh.named_faces.get(&name.to_string()).cloned().unwrap_or_default(),
+        };
+        if named.is_empty() {
+            let named = match scene.mesh.geometry {
+                GeometrySpec::Block(_) => "the faces of a block are xi1=0 to xi3=1, and boundary for all of them",
+                GeometrySpec::Exf(_) => {
+                    "boundary is all of it, 7:xi1=0 a single face of element 7, xi1=0 all faces on that side of their \
+                     element; faces between two elements are not on the boundary"
+                }
+            };
+            let face = name.to_string().into();
+            return Err(Error::NoSuchFace { face, named, place: Box::new(place.clone()) });
+        }
+        all.extend(named);
+    }
+    all.sort_unstable();
+    all.dedup();
+    Ok(all)
 }
 
-fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Muscle> {
-    let ElementSpec::Trilinear = spec.element;
-    let mesh = block(&Trilinear, spec.block.origin_mm, spec.block.size_mm, spec.block.elements);
+/// The mesh of a muscle and the angles of its fibres.
+fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles)> {
+    let (mesh, file) = match &spec.geometry {
+        GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
+        GeometrySpec::Exf(exf) => {
+            let file = ExFile::read(&exf.path)?;
+            let geometry = file.geometry(exf.field.as_deref())?;
+            (geometry.mesh.clone(), Some((file, geometry)))
+        }
+    };
     let angles = match &spec.fibres {
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
             FibreAngles { nodes: nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect() }
         }
+        FibresSpec::Field(field) => match &file {
+            Some((file, geometry)) => file.angles(field, geometry)?,
+            None => {
+                let (wanted, place) = (Some(field.as_str().into()), Box::new(spec.place.clone()));
+                return Err(Error::ExField { wanted, found: "".into(), place });
+            }
+        },
     };
+    Ok((mesh, angles))
+}
+
+fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Muscle> {
+    let ElementSpec::Trilinear = spec.element;
+    let (mesh, angles) = muscle_mesh(spec)?;
     let b = &spec.blemker;
     let law = Blemker {
         sigma_max: b.sigma_max_kpa,
@@ -161,17 +218,21 @@ fn embed(spec: &MuscleSpec, locator: &Locator<'_>, control: usize) -> Result<Mus
 }
 
 /// Warns where a muscle has so few quadrature points for the host's elements that the answer depends on where they fall.
-fn coarse_rule(spec: &MuscleSpec, host: &BlockSpec) -> Option<Warning> {
-    let points = |gauss: usize, d: usize| {
-        let host_element = host.size_mm[d] / host.elements[d] as f64;
-        let muscle_element = spec.block.size_mm[d] / spec.block.elements[d] as f64;
-        gauss as f64 * host_element / muscle_element
+/// `host_element` is the mean volume of a host element, mm3.
+fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_element: f64) -> Option<Warning> {
+    let fewest = match (&spec.geometry, host) {
+        (GeometrySpec::Block(own), GeometrySpec::Block(host)) => {
+            let element = |block: &BlockSpec, d: usize| block.size_mm[d] / block.elements[d] as f64;
+            let points = |d| spec.gauss as f64 * element(host, d) / element(own, d);
+            (0..3).map(points).fold(f64::INFINITY, f64::min)
+        }
+        // the mean over directions that need not agree
+        _ => (muscle.points().len() as f64 * host_element / muscle.volume()).cbrt(),
     };
-    let fewest = (0..3).map(|d| points(spec.gauss, d)).fold(f64::INFINITY, f64::min);
     if fewest >= POINTS_PER_HOST_ELEMENT {
         return None;
     }
-    let enough = (0..3).map(|d| (POINTS_PER_HOST_ELEMENT / points(1, d)).ceil()).fold(1.0, f64::max);
+    let enough = (spec.gauss as f64 * POINTS_PER_HOST_ELEMENT / fewest).ceil();
     Some(Warning {
         code: "G007",
         message: format!(
@@ -179,7 +240,7 @@ fn coarse_rule(spec: &MuscleSpec, host: &BlockSpec) -> Option<Warning> {
             spec.name
         ),
         place: Some(spec.place.clone()),
-        help: Some(format!("use gauss = {enough:.0} for this muscle, or more elements in its block")),
+        help: Some(format!("use gauss = {enough:.0} for this muscle, or more elements in its mesh")),
     })
 }
 
@@ -187,9 +248,9 @@ fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
     let mut all = Vec::new();
     for spec in &scene.supports {
         all.push(match &spec.kind {
-            SupportKind::Clamp { face } => Support::Clamp { faces: faces(mesh, face).to_vec() },
+            SupportKind::Clamp { face } => Support::Clamp { faces: faces(scene, mesh, face, &spec.place)? },
             SupportKind::Symmetry { face } => {
-                let faces = faces(mesh, face).to_vec();
+                let faces = faces(scene, mesh, face, &spec.place)?;
                 let Some(axis) = normal_axis(mesh, &faces) else {
                     return Err(Error::NotNormalToAxis {
                         face: face.to_string().into(),
@@ -201,7 +262,7 @@ fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
             SupportKind::Rotate { face, axis, through_mm, angle_deg } => {
                 debug_assert!(norm(*axis) > 0.0, "checked by the scene");
                 Support::Rotate {
-                    faces: faces(mesh, face).to_vec(),
+                    faces: faces(scene, mesh, face, &spec.place)?,
                     axis: normalised(*axis),
                     through: *through_mm,
                     angle: angle_deg.to_radians(),
