@@ -28,7 +28,9 @@ pub fn write_mesh(mesh: &Mesh, fields: &[(&str, &[Vector])]) -> String {
 
 /// The text of a region of data points with values on them; it may follow that of a mesh. The path starts with `/`.
 pub fn write_points(path: &str, fields: &[Points]) -> String {
-    let mut text = format!("Region: {path}\n!#nodeset datapoints\nShape. Dimension=0\n#Fields={}\n", fields.len());
+    let mut text =
+        format!("Region: {path}\n!#nodeset datapoints\nDefine node template: points\nShape. Dimension=0\n");
+    put(&mut text, &format!("#Fields={}\n", fields.len()));
     let mut count = usize::MAX;
     for (number, field) in fields.iter().enumerate() {
         match field {
@@ -47,6 +49,7 @@ pub fn write_points(path: &str, fields: &[Points]) -> String {
             }
         }
     }
+    put(&mut text, "Node template: points\n");
     for point in 0..if fields.is_empty() { 0 } else { count } {
         put(&mut text, &format!("Node: {}\n", point + 1));
         for field in fields {
