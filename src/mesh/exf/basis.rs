@@ -69,6 +69,11 @@ impl Basis {
         self.0 == [Basis1d::Linear; 3]
     }
 
+    /// Whether it is cubic Hermite in all directions.
+    pub fn is_tricubic_hermite(self) -> bool {
+        self.0 == [Basis1d::CubicHermite; 3]
+    }
+
     /// The number of its functions.
     pub fn functions(self) -> usize {
         self.0.iter().map(|basis| basis.functions()).product()

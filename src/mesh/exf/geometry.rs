@@ -254,7 +254,7 @@ impl ExFile {
             }
             functions.push(sum);
         }
-        if trilinear {
+        if trilinear || basis.is_tricubic_hermite() {
             return Ok(functions);
         }
         let composed = basis.hermite_weights().into_iter().map(|weights| {

@@ -3,7 +3,8 @@
 //! An EX file gives every element-local parameter as a sum of scale x nodal parameter, which is what an
 //! [`ElementMap`](super::map::ElementMap) holds: scale factors, versions, permuted and reversed directions, `zero`
 //! labels, sums of parameters and collapsed elements all read as such sums. A direction that is linear, quadratic or
-//! cubic Lagrange is exact in cubic Hermite form, where its derivatives are differences of its values.
+//! cubic Lagrange is exact in cubic Hermite form, where its derivatives are differences of its values. The displacement of a
+//! host has the map of its geometry, so it is of that lower order there too.
 //!
 //! What cannot be said in one map for all three components is refused with its file, line and construct: curvilinear
 //! coordinates (a polynomial in prolate coordinates is none in x, y, z), components with maps of their own, simplices,

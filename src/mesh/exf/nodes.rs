@@ -36,10 +36,14 @@ pub(super) type NodeField = Vec<Vec<Parameter>>;
 /// A node: its fields by name.
 pub(super) type Node = BTreeMap<String, NodeField>;
 
+/// Bit mask of the derivative and version of each parameter of a component, in the order of the file.
+type Labels = Vec<(u8, u32)>;
+
 /// What the nodes that follow hold.
 #[derive(Debug, Clone, Default)]
 pub(super) struct NodeTemplate {
-    fields: Vec<(FieldLine, Vec<Vec<(u8, u32)>>)>,
+    /// Each field with the labels and versions of each component.
+    fields: Vec<(FieldLine, Vec<Labels>)>,
 }
 
 impl FieldLine {
@@ -65,7 +69,7 @@ impl FieldLine {
                 name: name.into(),
                 is_coordinate: kind == "coordinate",
                 system: system.map_or("none", |part| part.split("focus").next().unwrap_or(part).trim()).into(),
-                numeric: !in_header && !parts.iter().any(|part| other(&part)),
+                numeric: !in_header && !parts.iter().any(other),
                 in_header,
                 components: number_after(rest, "#Components").filter(|count| (1..=1000).contains(count))?,
             })
@@ -108,7 +112,7 @@ impl NodeTemplate {
         }
         let mut values = values.into_iter();
         for (field, components) in numeric {
-            let component = |labels: &Vec<(u8, u32)>| {
+            let component = |labels: &Labels| {
                 let labels = labels.iter().zip(values.by_ref());
                 labels.map(|(&(label, version), value)| Parameter { label, version, value }).collect()
             };
@@ -130,7 +134,7 @@ fn component_form(version: u32) -> &'static str {
 }
 
 /// `x. #Values=4 (value,d/ds1(2),d/ds2)`: the versions of a label follow each other.
-fn labels(line: &str) -> Option<Vec<(u8, u32)>> {
+fn labels(line: &str) -> Option<Labels> {
     let count = number_after(line, "#Values")?;
     let list = &line[line.find('(')? + 1..line.rfind(')')?.max(line.find('(')? + 1)];
     let mut labels = Vec::new();
@@ -146,7 +150,7 @@ fn labels(line: &str) -> Option<Vec<(u8, u32)>> {
 }
 
 /// `x. Value index=1, #Derivatives=1 (d/ds1), #Versions=2`: the labels of a version follow each other.
-fn labels_of_version_1(line: &str) -> Option<Vec<(u8, u32)>> {
+fn labels_of_version_1(line: &str) -> Option<Labels> {
     number_after(line, "Value index")?;
     let derivatives = number_after(line, "#Derivatives")?;
     let mut names = vec![0];
