@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ActivationSpec, ControlValue, Curves, FaceSpec, FibresSpec, LawSpec, LoadKind, PartSpec, Scene, SupportKind,
-    Task, Units,
+    ActivationSpec, BlockSpec, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec, LawSpec, LoadKind,
+    PartSpec, Scene, SupportKind, Task, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -82,18 +82,25 @@ fn content(scene: &Scene) -> String {
     serde_json::to_string(scene).unwrap()
 }
 
+/// The block of the host.
+fn block(scene: &Scene) -> &BlockSpec {
+    let GeometrySpec::Block(block) = &scene.mesh.geometry else { panic!("the host is a block") };
+    block
+}
+
 #[test]
 fn a_whole_file_means_what_it_says() {
     let scene = parse(WHOLE, &[]).unwrap();
     assert_eq!((scene.name.as_str(), scene.task), ("smile", Task::Fit));
-    assert_eq!((scene.mesh.block.size_mm, scene.mesh.block.elements), ([60.0, 20.0, 20.0], [6, 2, 2]));
+    let block = block(&scene);
+    assert_eq!((block.size_mm, block.elements), ([60.0, 20.0, 20.0], [6, 2, 2]));
     assert_eq!(scene.tissue.law, LawSpec::MooneyRivlin { c1_kpa: 0.5, c2_kpa: 0.2 });
     assert_eq!((scene.tissue.kappa_kpa, scene.tissue.gauss), (10.0, 5));
     assert_eq!(scene.muscles[0].fibres, FibresSpec::Uniform([36.0, 0.0, 0.0]));
     assert!(matches!(&scene.muscles[1].fibres, FibresSpec::Nodes(nodes) if nodes[7] == [8.0, 0.0, 0.5]));
     assert_eq!(scene.muscles[1].place.line, 21);
-    let face = FaceSpec::BlockSide { direction: 0, end: 1 };
-    assert!(matches!(scene.supports[2].kind, SupportKind::Rotate { face: f, angle_deg: 90.0, .. } if f == face));
+    let face = FaceSpec(vec![FaceName::Side { direction: 0, end: 1 }]);
+    assert!(matches!(&scene.supports[2].kind, SupportKind::Rotate { face: f, angle_deg: 90.0, .. } if *f == face));
     assert!(matches!(scene.loads[0].kind, LoadKind::Traction { kpa: [0.0, 0.0, -0.04], .. }));
     assert_eq!(scene.controls[0].name, "risorius.L");
     assert_eq!(scene.controls[0].value, ControlValue::Constant(0.05));
@@ -230,14 +237,6 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     expect("risorius.L = 0.05", "masseter = 0.05", "C009", "masseter", "muscles: slab, risorius.L");
     expect("risorius.L = 0.05", "risorius.l = 0.05", "C009", "risorius.l", "did you mean `risorius.L`?");
     // C010 not in this version
-    let exf = "exf = \"face.exf\"";
-    expect(
-        "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }",
-        exf,
-        "C010",
-        "exf",
-        "use `block`",
-    );
     expect("kind = \"fit\"", "kind = \"study\"", "C010", "\"study\"", "this version has \"forward\", \"fit\"");
     expect("\"trilinear\"", "\"constant\"", "C010", "\"constant\"", "one pressure per element");
     // C011 not exactly one
@@ -346,8 +345,8 @@ fn overrides_are_merged_before_anything_is_checked() {
     assert_eq!(set(&["controls.risorius.L=0.5"]).controls[0].value, ControlValue::Constant(0.5));
     assert_eq!(set(&["controls.\"risorius.L\" = 0.5"]).controls.len(), 1);
     assert_eq!(set(&["controls.slab=0.1"]).controls[1].name, "slab");
-    assert_eq!(set(&["mesh.block.elements[0]=12"]).mesh.block.elements, [12, 2, 2]);
-    assert_eq!(set(&["mesh.block.elements=[3,1,1]"]).mesh.block.elements, [3, 1, 1]);
+    assert_eq!(block(&set(&["mesh.block.elements[0]=12"])).elements, [12, 2, 2]);
+    assert_eq!(block(&set(&["mesh.block.elements=[3,1,1]"])).elements, [3, 1, 1]);
     assert_eq!(set(&["fit.units=mm"]).fit.unwrap().units, Units::Mm);
     assert_eq!(set(&["output.every=2", "output.every=3"]).output.every, 3);
     // A value of the command line may mend the file.
@@ -662,8 +661,10 @@ proptest! {
     ) {
         prop_assume!(origin.iter().all(|x| x.is_finite()));
         let mut scene = parse(WHOLE, &[]).unwrap();
-        scene.mesh.block.origin_mm = origin;
-        scene.mesh.block.elements[1] = elements;
+        if let GeometrySpec::Block(block) = &mut scene.mesh.geometry {
+            block.origin_mm = origin;
+            block.elements[1] = elements;
+        }
         scene.tissue.law = LawSpec::MooneyRivlin { c1_kpa: c1, c2_kpa: 1e-3 };
         scene.tissue.kappa_kpa = kappa;
         scene.muscles[0].fibres = FibresSpec::Uniform([angle, 0.0, -0.0]);

@@ -50,10 +50,13 @@ pub(super) fn prepare(source: &Source) -> Result<Prepared> {
 
 fn clip(source: &Source, scene: &Scene, fit: &FitSpec) -> Result<Clip> {
     let recording = source.recording(fit)?;
-    let mesh = host(scene);
     let frames = chosen_frames(fit, &recording);
-    let markers = place(scene, fit, &mesh, &recording)
-        .and_then(|markers| check_units(&markers, &mesh, &recording, fit).map(|()| markers));
+    let markers = match host(&scene.mesh) {
+        Ok(mesh) => place(scene, fit, &mesh, &recording)
+            .and_then(|markers| check_units(&markers, &mesh, &recording, fit).map(|()| markers)),
+        // building the model tells what is wrong with the host
+        Err(_) => Err(Error::Mistakes(Vec::new())),
+    };
     match (frames, markers) {
         (Ok(frames), Ok(markers)) => Ok(Clip { recording, frames, markers }),
         (frames, markers) => {

@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::model::build::Built;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Manifest, RunFolder, Status};
-use crate::scene::{ControlValue, FitSpec, Task};
+use crate::scene::{ControlValue, FitSpec, GeometrySpec, Task};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -150,7 +150,12 @@ fn input_files(source: &Source) -> Vec<PathBuf> {
         ControlValue::Constant(_) | ControlValue::Nodes(_) => None,
     });
     let markers = scene.fit.iter().filter(|f| scene.task == Task::Fit && source.embedded_recording(f).is_none());
-    let mut files: Vec<PathBuf> = curves.chain(markers.map(|f| f.markers.clone())).collect();
+    let geometries = std::iter::once(&scene.mesh.geometry).chain(scene.muscles.iter().map(|muscle| &muscle.geometry));
+    let meshes = geometries.filter_map(|geometry| match geometry {
+        GeometrySpec::Exf(exf) => Some(exf.path.clone()),
+        GeometrySpec::Block(_) => None,
+    });
+    let mut files: Vec<PathBuf> = curves.chain(meshes).chain(markers.map(|f| f.markers.clone())).collect();
     files.sort();
     files.dedup();
     files

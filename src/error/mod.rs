@@ -501,6 +501,60 @@ pub enum Error {
         /// The contact in the problem file.
         place: Box<Place>,
     },
+    /// A line of an EX file is not what the format asks for.
+    #[error("the EX file cannot be read: this should be {expected}")]
+    ExSyntax {
+        /// What the format asks for here.
+        expected: String,
+        /// The line.
+        place: Box<Place>,
+    },
+    /// An EX file uses something that has no exact counterpart here.
+    #[error("the EX file uses {construct}, which cannot be represented exactly")]
+    ExUnsupported {
+        /// What it uses, with the names in the file.
+        construct: String,
+        /// What would do.
+        help: &'static str,
+        /// The line.
+        place: Box<Place>,
+    },
+    /// An EX file has not the field asked for, or several and none was asked for.
+    #[error("{}", ex_field(wanted.as_deref(), found))]
+    ExField {
+        /// The field asked for.
+        wanted: Option<Box<str>>,
+        /// The fields that its elements have.
+        found: Box<str>,
+        /// The file.
+        place: Box<Place>,
+    },
+    /// An element of an EX file uses something that the file does not have.
+    #[error("the EX file lacks {what}")]
+    ExMissing {
+        /// What is not there.
+        what: String,
+        /// The line that uses it, or the file.
+        place: Box<Place>,
+    },
+    /// The mesh of the host has no such face.
+    #[error("the host has no face `{face}` on its boundary")]
+    NoSuchFace {
+        /// The face.
+        face: Box<str>,
+        /// The kinds of names that its faces have.
+        named: &'static str,
+        /// The support or load in the problem file.
+        place: Box<Place>,
+    },
+    /// The host is of a kind that cannot carry the displacement.
+    #[error("field `{field}` is trilinear: a host needs tricubic Hermite elements")]
+    HostNotHermite {
+        /// The field of the EX file.
+        field: Box<str>,
+        /// The mesh in the problem file.
+        place: Box<Place>,
+    },
     // ---- S: solver ------------------------------------------------------------------------------------
     /// The factorisation met a pivot that is not a finite number.
     #[error("the tangent matrix cannot be factorised: it holds a value that is not finite")]
@@ -695,7 +749,13 @@ impl Error {
             Error::NotNormalToAxis { .. } => "G006",
             Error::PointOutside { .. } => "G020",
             Error::BadRegion { .. } => "G021",
-            Error::StartsInContact { .. } => "G009",
+            Error::StartsInContact { .. } => "G022",
+            Error::ExSyntax { .. } => "G008",
+            Error::ExUnsupported { .. } => "G009",
+            Error::ExField { .. } => "G010",
+            Error::ExMissing { .. } => "G011",
+            Error::NoSuchFace { .. } => "G012",
+            Error::HostNotHermite { .. } => "G013",
             Error::NotFinite => "S001",
             Error::NotConverged { .. } => "S003",
             Error::InaccurateSolve { .. } => "S004",
@@ -796,6 +856,19 @@ impl Error {
                  start in front of its surface)"
                     .into(),
             ),
+            Error::ExSyntax { .. } => Some(
+                "EX files of versions 1, 2 and 3 are read; of version 1, put the nodes and the elements into one file".into(),
+            ),
+            Error::ExUnsupported { help, .. } => Some((*help).into()),
+            Error::ExField { found, .. } if found.is_empty() => {
+                Some("the file needs three-dimensional elements with a field of coordinates".into())
+            }
+            Error::ExField { found, .. } => Some(format!("name one of its fields: {found}")),
+            Error::ExMissing { .. } => Some("write the file again with all nodes and fields that its elements use".into()),
+            Error::NoSuchFace { named, .. } => Some((*named).into()),
+            Error::HostNotHermite { .. } => {
+                Some("write the field with the basis c.Hermite in at least one direction".into())
+            }
             Error::StepNotSolved { .. } => {
                 Some("scale the problem: give realistic sd_mm, and remove unknowns that no marker sees".into())
             }
@@ -854,6 +927,12 @@ impl Error {
             | Error::PointOutside { place, .. }
             | Error::BadRegion { place, .. }
             | Error::StartsInContact { place, .. }
+            | Error::ExSyntax { place, .. }
+            | Error::ExUnsupported { place, .. }
+            | Error::ExField { place, .. }
+            | Error::ExMissing { place, .. }
+            | Error::NoSuchFace { place, .. }
+            | Error::HostNotHermite { place, .. }
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
@@ -896,6 +975,15 @@ pub struct MuscleOutside {
 /// How a file of some length starts.
 fn start_of(bytes: u64, start: &[u8]) -> String {
     if bytes == 0 { "it is empty".into() } else { format!("its {bytes} bytes start with `{}`", start.escape_ascii()) }
+}
+
+/// The message of [`Error::ExField`].
+fn ex_field(wanted: Option<&str>, found: &str) -> String {
+    match wanted {
+        Some(wanted) => format!("no element of the EX file has a suitable field `{wanted}`"),
+        None if found.is_empty() => "the EX file has no three-dimensional element with a field".into(),
+        None => "the EX file has no field `coordinates`, and not just one other field of coordinates".into(),
+    }
 }
 
 /// A mistake as a line of a list.

@@ -3,6 +3,7 @@
 pub mod bezier;
 pub mod block;
 pub mod element;
+pub mod exf;
 pub mod face;
 pub mod fibre_angles;
 pub mod location;

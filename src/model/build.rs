@@ -8,13 +8,15 @@ use crate::material::fibre::Blemker;
 use crate::math::tensor::{norm, normalised};
 use crate::mesh::block::block;
 use crate::mesh::element::{TricubicHermite, Trilinear};
-use crate::mesh::face::Face;
+use crate::mesh::exf::{ExFile, Geometry};
+use crate::mesh::face::{Face, boundary_faces};
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ElementSpec, FaceSpec, FibresSpec, InitialSpec, LoadKind,
-    MuscleSpec, PressureSpec, Scene, SupportKind, SurfaceSpec,
+    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceName, FaceSpec,
+    FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, PressureSpec, Scene, SupportKind,
+    SurfaceSpec,
 };
 use crate::term::Term;
 use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
@@ -45,7 +47,7 @@ const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
 /// host, supports that contradict each other, points of loads outside,
 /// regions that are none.
 pub fn build(scene: &Scene) -> Result<Built> {
-    let mesh = host(scene);
+    let mesh = host(&scene.mesh)?;
     let space: &'static dyn PressureSpace = match scene.tissue.pressure {
         PressureSpec::Trilinear => &pressure::Trilinear,
         PressureSpec::DiscontinuousTrilinear => &pressure::DiscontinuousTrilinear,
@@ -60,20 +62,18 @@ pub fn build(scene: &Scene) -> Result<Built> {
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
     for spec in &scene.muscles {
-        let (activation, names) = match spec.activation {
-            ActivationSpec::Uniform => (Activation::Uniform(controls.len()), vec![spec.name.clone()]),
-            ActivationSpec::Field => {
-                let names = (0..spec.block.nodes()).map(|node| format!("{}[{node}]", spec.name));
-                (Activation::Field(controls.len()), names.collect())
+        let names = match embed(scene, spec, &locator, controls.len()) {
+            Ok((muscle, names)) => {
+                let host_element = volume / mesh.elements() as f64;
+                warnings.extend(coarse_rule(spec, &scene.mesh.geometry, &muscle, host_element));
+                terms.push(Box::new(muscle));
+                names
+            }
+            Err(error) => {
+                mistakes.push(error);
+                Vec::new()
             }
         };
-        match embed(spec, &locator, activation) {
-            Ok(muscle) => {
-                warnings.extend(coarse_rule(spec, &scene.mesh.block));
-                terms.push(Box::new(muscle));
-            }
-            Err(error) => mistakes.push(error),
-        }
         let sigma_max = spec.blemker.sigma_max_kpa;
         let onset = if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 };
         controls.extend(names.into_iter().map(|name| Control { name, lower: 0.0, upper: 1.0, onset }));
@@ -88,7 +88,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     };
     let slidings = scene.slidings.iter().map(|spec| (spec, Allows::Closed));
     for (spec, allows) in slidings.chain(scene.contacts.iter().map(|spec| (spec, Allows::ClosedOrOpen))) {
-        match contact(spec, allows, &mesh) {
+        match contact(scene, spec, allows, &mesh) {
             Ok((contact, warning)) => {
                 terms.push(Box::new(contact));
                 warnings.extend(warning);
@@ -97,27 +97,31 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     for load in &scene.loads {
-        terms.push(match &load.kind {
-            LoadKind::Traction { face, kpa } => Box::new(traction(&mesh, faces(&mesh, face), *kpa, gauss)),
-            LoadKind::Gravity { density_kg_m3, acceleration_m_s2 } => {
-                Box::new(gravity(&mesh, *density_kg_m3, *acceleration_m_s2, gauss))
-            }
-            LoadKind::BodyForce { mn_mm3 } => Box::new(body_force(&mesh, *mn_mm3, gauss)),
-            LoadKind::Pressure { face, kpa } => {
-                Box::new(FollowerPressure::new(&mesh, faces(&mesh, face), *kpa, gauss))
-            }
-            LoadKind::NodalForce { position_mm, mn } => match point(*position_mm, "the force", &load.place) {
-                Ok(at) => Box::new(nodal_force(&mesh, at, *mn)),
-                Err(error) => {
-                    mistakes.push(error);
-                    continue;
-                }
+        match &load.kind {
+            LoadKind::Traction { face, kpa } => match faces(scene, &mesh, face, &load.place) {
+                Ok(faces) => terms.push(Box::new(traction(&mesh, &faces, *kpa, gauss))),
+                Err(error) => mistakes.push(error),
             },
-            LoadKind::Spring { face, kpa_per_mm, normal_only } => {
-                let resists = if *normal_only { Resists::Normal } else { Resists::All };
-                Box::new(Springs::foundation(&mesh, faces(&mesh, face), *kpa_per_mm, resists, gauss))
+            LoadKind::Gravity { density_kg_m3, acceleration_m_s2 } => {
+                terms.push(Box::new(gravity(&mesh, *density_kg_m3, *acceleration_m_s2, gauss)));
             }
-        });
+            LoadKind::BodyForce { mn_mm3 } => terms.push(Box::new(body_force(&mesh, *mn_mm3, gauss))),
+            LoadKind::Pressure { face, kpa } => match faces(scene, &mesh, face, &load.place) {
+                Ok(faces) => terms.push(Box::new(FollowerPressure::new(&mesh, &faces, *kpa, gauss))),
+                Err(error) => mistakes.push(error),
+            },
+            LoadKind::NodalForce { position_mm, mn } => match point(*position_mm, "the force", &load.place) {
+                Ok(at) => terms.push(Box::new(nodal_force(&mesh, at, *mn))),
+                Err(error) => mistakes.push(error),
+            },
+            LoadKind::Spring { face, kpa_per_mm, normal_only } => match faces(scene, &mesh, face, &load.place) {
+                Ok(faces) => {
+                    let resists = if *normal_only { Resists::Normal } else { Resists::All };
+                    terms.push(Box::new(Springs::foundation(&mesh, &faces, *kpa_per_mm, resists, gauss)));
+                }
+                Err(error) => mistakes.push(error),
+            },
+        }
     }
     let mut ties = Vec::new();
     for attachment in &scene.attachments {
@@ -157,24 +161,97 @@ pub fn build(scene: &Scene) -> Result<Built> {
 }
 
 /// The mesh of the host at rest.
-pub fn host(scene: &Scene) -> Mesh {
-    let spec = &scene.mesh.block;
-    block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)
+///
+/// # Errors
+/// An EX file that cannot be read, or that holds no tricubic Hermite mesh.
+pub fn host(spec: &MeshSpec) -> Result<Mesh> {
+    match &spec.geometry {
+        GeometrySpec::Block(spec) => Ok(block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)),
+        GeometrySpec::Exf(exf) => {
+            let Geometry { mesh, field, .. } = ExFile::read(&exf.path)?.geometry(exf.field.as_deref())?;
+            if mesh.element.parameters_per_node() == 8 {
+                return Ok(mesh);
+            }
+            Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
+        }
+    }
 }
 
-fn faces<'m>(mesh: &'m Mesh, spec: &FaceSpec) -> &'m [Face] {
-    mesh.named_faces.get(&spec.to_string()).map_or(&[], Vec::as_slice)
+/// The faces with any of the names, each once, in order.
+fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) -> Result<Vec<Face>> {
+    let mut all = Vec::new();
+    for name in names {
+        let named = match name {
+            FaceName::Boundary => boundary_faces(mesh),
+            name => mesh.named_faces.get(&name.to_string()).cloned().unwrap_or_default(),
+        };
+        if named.is_empty() {
+            let named = match scene.mesh.geometry {
+                GeometrySpec::Block(_) => "the faces of a block are xi1=0 to xi3=1, and boundary for all of them",
+                GeometrySpec::Exf(_) => {
+                    "boundary is all of it, 7:xi1=0 a single face of element 7, xi1=0 all faces on that side of their \
+                     element; faces between two elements are not on the boundary"
+                }
+            };
+            let face = name.to_string().into();
+            return Err(Error::NoSuchFace { face, named, place: Box::new(place.clone()) });
+        }
+        all.extend(named);
+    }
+    all.sort_unstable();
+    all.dedup();
+    Ok(all)
 }
 
-fn embed(spec: &MuscleSpec, locator: &Locator<'_>, activation: Activation) -> Result<Muscle> {
-    let ElementSpec::Trilinear = spec.element;
-    let mesh = block(&Trilinear, spec.block.origin_mm, spec.block.size_mm, spec.block.elements);
+/// The mesh of a muscle and the angles of its fibres.
+fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles)> {
+    let (mesh, file) = match &spec.geometry {
+        GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
+        GeometrySpec::Exf(exf) => {
+            let file = ExFile::read(&exf.path)?;
+            let geometry = file.geometry(exf.field.as_deref())?;
+            (geometry.mesh.clone(), Some((file, geometry)))
+        }
+    };
     let angles = match &spec.fibres {
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
             FibreAngles { nodes: nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect() }
         }
+        FibresSpec::Field(field) => match &file {
+            Some((file, geometry)) => file.angles(field, geometry)?,
+            None => {
+                let (wanted, place) = (Some(field.as_str().into()), Box::new(spec.place.clone()));
+                return Err(Error::ExField { wanted, found: "".into(), place });
+            }
+        },
     };
+    Ok((mesh, angles))
+}
+
+/// Embeds a muscle whose first control is `first`; gives the names of its controls too.
+fn embed(scene: &Scene, spec: &MuscleSpec, locator: &Locator<'_>, first: usize) -> Result<(Muscle, Vec<String>)> {
+    let ElementSpec::Trilinear = spec.element;
+    let (mesh, angles) = muscle_mesh(spec)?;
+    let (activation, names) = match spec.activation {
+        ActivationSpec::Uniform => (Activation::Uniform(first), vec![spec.name.clone()]),
+        ActivationSpec::Field => {
+            let names = (0..mesh.nodes).map(|node| format!("{}[{node}]", spec.name));
+            (Activation::Field(first), names.collect())
+        }
+    };
+    for control in scene.controls.iter().filter(|control| control.name == spec.name) {
+        if let ControlValue::Nodes(values) = &control.value
+            && values.len() != names.len()
+        {
+            return Err(Error::WrongLength {
+                key: format!("controls.{}", spec.name),
+                found: format!("activations for {} nodes", values.len()).into(),
+                expected: format!("{}, one for each node of the muscle's mesh", names.len()),
+                place: control.place.clone(),
+            });
+        }
+    }
     let b = &spec.blemker;
     let law = Blemker {
         sigma_max: b.sigma_max_kpa,
@@ -183,7 +260,8 @@ fn embed(spec: &MuscleSpec, locator: &Locator<'_>, activation: Activation) -> Re
         p1: b.p1,
         p2: b.p2,
     };
-    Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, activation).map_err(|error| match error {
+    let muscle = Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, activation);
+    muscle.map(|muscle| (muscle, names)).map_err(|error| match error {
         NotEmbedded::Outside { count, of, element, position, distance } => {
             Error::MuscleOutside(Box::new(MuscleOutside {
                 muscle: spec.name.clone(),
@@ -207,9 +285,9 @@ fn embed(spec: &MuscleSpec, locator: &Locator<'_>, activation: Activation) -> Re
 /// A reference shape that violates a contact by less is taken as rounding, mm.
 const START_TOLERANCE: f64 = 1e-6;
 
-fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, Option<Warning>)> {
+fn contact(scene: &Scene, spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, Option<Warning>)> {
     let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
-    let faces = faces(mesh, &spec.face);
+    let faces = faces(scene, mesh, &spec.face, &spec.place)?;
     let surface: Box<dyn RigidSurface> = match spec.surface {
         SurfaceSpec::Plane { through_mm, normal } => {
             Box::new(Plane { through: through_mm, normal: normalised(normal) })
@@ -223,7 +301,7 @@ fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, 
         SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
             Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
         }
-        SurfaceSpec::Reference => Box::new(Patches::new(mesh, faces, FreeSide::Inside)),
+        SurfaceSpec::Reference => Box::new(Patches::new(mesh, &faces, FreeSide::Inside)),
     };
     let law: Box<dyn ContactLaw> = match spec.law {
         ContactLawSpec::Penalty { kpa_per_mm } => Box::new(Penalty { stiffness: kpa_per_mm }),
@@ -235,7 +313,7 @@ fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, 
         }
     };
     let relax = spec.initial == InitialSpec::Relax;
-    let contact = Contact::new(&spec.name, Interface { allows, surface, law, relax }, mesh, faces, spec.gauss);
+    let contact = Contact::new(&spec.name, Interface { allows, surface, law, relax }, mesh, &faces, spec.gauss);
     let Some((at, position, gap)) = contact.worst_start(mesh) else { return Ok((contact, None)) };
     let barrier = matches!(spec.law, ContactLawSpec::Barrier { .. });
     let wrong = match allows {
@@ -250,7 +328,7 @@ fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, 
         return Err(Error::StartsInContact { name, gap, position, element: at.element, place });
     }
     let warning = Warning {
-        code: "G008",
+        code: "G023",
         message: format!(
             "`{}`: the reference shape has a gap of {gap:.3} mm at ({:.2}, {:.2}, {:.2}) mm, which is relaxed along \
              the load path",
@@ -263,17 +341,21 @@ fn contact(spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, 
 }
 
 /// Warns where a muscle has so few quadrature points for the host's elements that the answer depends on where they fall.
-fn coarse_rule(spec: &MuscleSpec, host: &BlockSpec) -> Option<Warning> {
-    let points = |gauss: usize, d: usize| {
-        let host_element = host.size_mm[d] / host.elements[d] as f64;
-        let muscle_element = spec.block.size_mm[d] / spec.block.elements[d] as f64;
-        gauss as f64 * host_element / muscle_element
+/// `host_element` is the mean volume of a host element, mm3.
+fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_element: f64) -> Option<Warning> {
+    let fewest = match (&spec.geometry, host) {
+        (GeometrySpec::Block(own), GeometrySpec::Block(host)) => {
+            let element = |block: &BlockSpec, d: usize| block.size_mm[d] / block.elements[d] as f64;
+            let points = |d| spec.gauss as f64 * element(host, d) / element(own, d);
+            (0..3).map(points).fold(f64::INFINITY, f64::min)
+        }
+        // the mean over directions that need not agree
+        _ => (muscle.points().len() as f64 * host_element / muscle.volume()).cbrt(),
     };
-    let fewest = (0..3).map(|d| points(spec.gauss, d)).fold(f64::INFINITY, f64::min);
     if fewest >= POINTS_PER_HOST_ELEMENT {
         return None;
     }
-    let enough = (0..3).map(|d| (POINTS_PER_HOST_ELEMENT / points(1, d)).ceil()).fold(1.0, f64::max);
+    let enough = (spec.gauss as f64 * POINTS_PER_HOST_ELEMENT / fewest).ceil();
     Some(Warning {
         code: "G007",
         message: format!(
@@ -281,31 +363,31 @@ fn coarse_rule(spec: &MuscleSpec, host: &BlockSpec) -> Option<Warning> {
             spec.name
         ),
         place: Some(spec.place.clone()),
-        help: Some(format!("use gauss = {enough:.0} for this muscle, or more elements in its block")),
+        help: Some(format!("use gauss = {enough:.0} for this muscle, or more elements in its mesh")),
     })
 }
 
 fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
     let plane = |face: &FaceSpec, place: &Place| {
-        normal_axis(mesh, faces(mesh, face))
+        normal_axis(mesh, &faces(scene, mesh, face, place)?)
             .ok_or_else(|| Error::NotNormalToAxis { face: face.to_string().into(), place: Box::new(place.clone()) })
     };
     let mut all = Vec::new();
     for spec in &scene.supports {
         all.push(match &spec.kind {
-            SupportKind::Clamp { face } => Support::Clamp { faces: faces(mesh, face).to_vec() },
+            SupportKind::Clamp { face } => Support::Clamp { faces: faces(scene, mesh, face, &spec.place)? },
             SupportKind::Symmetry { face } => {
-                Support::Symmetry { faces: faces(mesh, face).to_vec(), axis: plane(face, &spec.place)? }
+                Support::Symmetry { faces: faces(scene, mesh, face, &spec.place)?, axis: plane(face, &spec.place)? }
             }
             SupportKind::Plate { face, offset_mm } => Support::Plate {
-                faces: faces(mesh, face).to_vec(),
+                faces: faces(scene, mesh, face, &spec.place)?,
                 axis: plane(face, &spec.place)?,
                 offset: *offset_mm,
             },
             SupportKind::Rotate { face, axis, through_mm, angle_deg } => {
                 debug_assert!(norm(*axis) > 0.0, "checked by the scene");
                 Support::Rotate {
-                    faces: faces(mesh, face).to_vec(),
+                    faces: faces(scene, mesh, face, &spec.place)?,
                     axis: normalised(*axis),
                     through: *through_mm,
                     angle: angle_deg.to_radians(),

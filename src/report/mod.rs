@@ -6,11 +6,13 @@
 //!   summary.txt                         the page that the terminal showed
 //!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
 //!   view/result.pvd, muscles.pvd, contact.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
+//!   view/result_0000.exf, ...           the same shapes for Zinc and cmgui
 //! ```
 //!
 //! Whole files are written atomically, tables grow frame by frame: a crash or a full disk leaves every finished frame
 //! readable.
 
+pub mod exf;
 pub mod frame;
 pub mod machine;
 pub mod manifest;

@@ -1,5 +1,6 @@
 //! The folder `view`: the shapes of every frame, and the lists that play them.
 
+use super::exf;
 use super::frame::{Frame, MarkerPair};
 use super::pvd::Collection;
 use super::run_folder::RunFolder;
@@ -41,13 +42,15 @@ impl View {
         }
     }
 
-    /// Adds a frame: the exact shape, the resampled one, the muscles and contacts if the model has any, the markers if there are any.
+    /// Adds a frame: the exact shape (also as an EX file), the resampled one, the muscles and contacts if the model has any,
+    /// the markers if there are any.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
     pub fn add(&mut self, frame: Frame, model: &Model, state: &State, markers: &[MarkerPair<'_>]) -> Result<()> {
         self.shape.add(frame, &bezier::shape(model, state, frame.time_s))?;
         self.linear.add(frame, &linear::shape(model, state, frame.time_s))?;
+        exf::write(&self.folder.join(format!("result_{:04}.exf", frame.index)), model, state)?;
         if model.muscles().next().is_some() {
             self.muscles.add(frame, &muscles::points(model, state, frame.time_s))?;
         }

@@ -278,16 +278,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// A key that a later version will know, which stands for the key `instead` of today.
-    pub fn later(&mut self, key: &'static str, what: &'static str, instead: &'static str) {
-        if self.entry_key(key).is_some() {
-            self.missing.retain(|(missing, _)| *missing != instead);
-            if let Some(item) = self.item(key) {
-                let place = self.entry_key(key).unwrap_or(&item.node.place).clone();
-                let instead = format!("use `{instead}`");
-                self.mistakes.add(Error::NotInThisVersion { key: item.path, what, instead, place });
-            }
-        }
+    /// Whether a key is there; it still has to be asked for.
+    pub fn has(&self, key: &str) -> bool {
+        self.entry_key(key).is_some()
     }
 
     /// The one key of a table that chooses among alternatives.

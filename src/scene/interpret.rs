@@ -5,7 +5,7 @@ use super::contacts;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
 use super::references::References;
 use super::spec::*;
-use super::tree::Node;
+use super::tree::{Node, Value};
 use super::units::Units;
 
 /// The scene of a whole file; `None` if there is any mistake in a value.
@@ -17,14 +17,14 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let mesh = file.required(
             "mesh",
             "[mesh]\nblock = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }",
-            |item| item.table(mesh),
+            |item| item.table(|table| mesh(table, references)),
         );
         let tissue = file.required("tissue", "[tissue]\nmooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }", |item| {
             item.table(tissue)
         });
         let word = tissue.as_ref().map(|tissue| tissue.law.word());
         let regions = file.tables("region", |table| region(table, word));
-        let muscles = file.tables("muscle", muscle);
+        let muscles = file.tables("muscle", |table| muscle(table, references));
         let supports = file.tables("support", support);
         let (slidings, contacts) = contacts::both(file);
         let loads = file.tables("load", load);
@@ -113,12 +113,22 @@ fn block(table: &mut Table) -> Option<BlockSpec> {
     Some(BlockSpec { origin_mm: origin_mm?, size_mm: size_mm?, elements })
 }
 
-fn mesh(table: &mut Table) -> Option<MeshSpec> {
+fn mesh(table: &mut Table, references: &References) -> Option<MeshSpec> {
     let example = "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
-    let block = table.required("block", example, |item| item.table(block));
-    table.later("exf", "a mesh from an EXF file", "block");
-    table.later("field", "a field of an EXF file", "block");
-    Some(MeshSpec { block: block?, place: table.place() })
+    Some(MeshSpec { geometry: geometry(table, references, example)?, place: table.place() })
+}
+
+/// `block`, or `exf` with `field`.
+fn geometry(table: &mut Table, references: &References, example: &'static str) -> Option<GeometrySpec> {
+    let block = table.item("block").map(|item| item.table(block));
+    let exf = table.item("exf").map(|item| references.file(&item));
+    let field = if exf.is_some() { table.optional("field", |item| item.name()) } else { Some(None) };
+    match (block, exf) {
+        (Some(block), None) => block.map(GeometrySpec::Block),
+        (None, Some(path)) => Some(GeometrySpec::Exf(ExfSpec { path: path?, field: field? })),
+        (None, None) => table.required("block", example, |_| None),
+        (Some(_), Some(_)) => table.not_exactly_one(&["block", "exf"], &["block", "exf"]),
+    }
 }
 
 fn tissue(table: &mut Table) -> Option<TissueSpec> {
@@ -200,18 +210,20 @@ fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
     Some(LawSpec::MooneyRivlin { c1_kpa, c2_kpa })
 }
 
-fn muscle(table: &mut Table) -> Option<MuscleSpec> {
+fn muscle(table: &mut Table, references: &References) -> Option<MuscleSpec> {
     let name = table.required("name", "name = \"slab\"", |item| item.name());
-    let block = table.required(
-        "block",
-        "block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }",
-        |item| item.table(block),
-    );
-    table.later("exf", "a muscle mesh from an EXF file", "block");
+    let example = "block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }";
+    let in_file = table.has("exf");
+    let geometry = geometry(table, references, example);
     let later = [("hermite", "tricubic Hermite muscles")];
-    let element = table
-        .or("element", ElementSpec::Trilinear, |item| item.choice(&[("trilinear", ElementSpec::Trilinear)], &later));
-    let fibres = fibres(table, block.as_ref());
+    let element = match in_file {
+        // the file says what its elements are
+        true => Some(ElementSpec::Trilinear),
+        false => table.or("element", ElementSpec::Trilinear, |item| {
+            item.choice(&[("trilinear", ElementSpec::Trilinear)], &later)
+        }),
+    };
+    let fibres = if in_file { fibres_in_file(table) } else { fibres(table, geometry.as_ref()) };
     let activations = [("uniform", ActivationSpec::Uniform), ("field", ActivationSpec::Field)];
     let activation = table.or("activation", ActivationSpec::Uniform, |item| item.choice(&activations, &[]));
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
@@ -219,7 +231,7 @@ fn muscle(table: &mut Table) -> Option<MuscleSpec> {
     let blemker = table.required("blemker", example, |item| item.table(blemker));
     Some(MuscleSpec {
         name: name?,
-        block: block?,
+        geometry: geometry?,
         element: element?,
         fibres: fibres?,
         activation: activation?,
@@ -230,7 +242,11 @@ fn muscle(table: &mut Table) -> Option<MuscleSpec> {
 }
 
 /// Angles everywhere or at the nodes; a list at the nodes must have one entry for each.
-fn fibres(table: &mut Table, block: Option<&BlockSpec>) -> Option<FibresSpec> {
+fn fibres(table: &mut Table, geometry: Option<&GeometrySpec>) -> Option<FibresSpec> {
+    let block = match geometry {
+        Some(GeometrySpec::Block(block)) => Some(block),
+        _ => None,
+    };
     let uniform = table.item("fibre_angles_deg").map(|item| item.numbers(FINITE));
     let nodes = table.item("fibre_angles_nodes_deg").map(|item| {
         let angles = item.list("a list with the 3 angles of every node", |node| node.numbers(FINITE))?;
@@ -242,7 +258,6 @@ fn fibres(table: &mut Table, block: Option<&BlockSpec>) -> Option<FibresSpec> {
             _ => Some(angles),
         }
     });
-    table.later("angles_field", "fibre angles from an EXF file", "fibre_angles_deg");
     match (uniform, nodes) {
         (Some(uniform), None) => uniform.map(FibresSpec::Uniform),
         (None, Some(nodes)) => nodes.map(FibresSpec::Nodes),
@@ -251,6 +266,20 @@ fn fibres(table: &mut Table, block: Option<&BlockSpec>) -> Option<FibresSpec> {
             &["fibre_angles_deg", "fibre_angles_nodes_deg"],
             &["fibre_angles_deg", "fibre_angles_nodes_deg"],
         ),
+    }
+}
+
+/// Angles everywhere, or a field of the muscle's EX file.
+fn fibres_in_file(table: &mut Table) -> Option<FibresSpec> {
+    let uniform = table.item("fibre_angles_deg").map(|item| item.numbers(FINITE));
+    let field = table.item("angles_field").map(|item| item.name());
+    match (uniform, field) {
+        (Some(uniform), None) => uniform.map(FibresSpec::Uniform),
+        (None, Some(field)) => field.map(FibresSpec::Field),
+        (None, None) => table.required("angles_field", "angles_field = \"fibres\"", |_| None),
+        (Some(_), Some(_)) => {
+            table.not_exactly_one(&["fibre_angles_deg", "angles_field"], &["fibre_angles_deg", "angles_field"])
+        }
     }
 }
 
@@ -294,12 +323,30 @@ fn rotate(table: &mut Table) -> Option<SupportKind> {
     Some(SupportKind::Rotate { face: face?, axis: axis?, through_mm: through_mm?, angle_deg: angle_deg? })
 }
 
-/// A side of the block: `"xi1=0"` to `"xi3=1"`.
+/// A name of faces, or a list of names.
 pub(super) fn face(table: &mut Table) -> Option<FaceSpec> {
-    let sides = [0, 1, 2].iter().flat_map(|&direction| [0, 1].map(|end| FaceSpec::BlockSide { direction, end }));
-    let sides: Vec<(String, FaceSpec)> = sides.map(|side| (side.to_string(), side)).collect();
-    let words: Vec<(&str, FaceSpec)> = sides.iter().map(|(word, side)| (word.as_str(), *side)).collect();
-    table.required("face", "face = \"xi1=0\"", |item| item.choice(&words, &[]))
+    table.required("face", "face = \"xi1=0\"", |item| match item.node.value {
+        Value::List(_) => match item.list("a list of faces", |entry| face_name(&entry))? {
+            names if names.is_empty() => item.wrong_length("no entry", "the name of at least one face"),
+            names => Some(FaceSpec(names)),
+        },
+        _ => face_name(&item).map(|name| FaceSpec(vec![name])),
+    })
+}
+
+/// `"boundary"`, `"xi1=0"` to `"xi3=1"`, or with the number of an element `"7:xi1=0"`.
+fn face_name(item: &Item) -> Option<FaceName> {
+    let sides = [0, 1, 2].iter().flat_map(|&direction| [0, 1].map(|end| FaceName::Side { direction, end }));
+    let names: Vec<(String, FaceName)> =
+        sides.chain([FaceName::Boundary]).map(|name| (name.to_string(), name)).collect();
+    let words: Vec<(&str, FaceName)> = names.iter().map(|(word, name)| (word.as_str(), *name)).collect();
+    if let Some((element, side)) = item.text()?.split_once(':')
+        && let Ok(element) = element.trim().parse()
+        && let Some((_, FaceName::Side { direction, end })) = words.iter().find(|(word, _)| *word == side.trim())
+    {
+        return Some(FaceName::OfElement { element, direction: *direction, end: *end });
+    }
+    item.choice(&words, &[])
 }
 
 fn load(table: &mut Table) -> Option<LoadSpec> {

@@ -40,7 +40,7 @@ impl Scene {
             name,
             folder: _, // every path is absolute
             task,
-            mesh: MeshSpec { block: mesh, place: _ },
+            mesh: MeshSpec { geometry: host, place: _ },
             tissue,
             regions,
             muscles,
@@ -63,7 +63,7 @@ impl Scene {
             "\n[task]".into(),
             format!("kind = \"{}\"", task.word()),
             "\n[mesh]".into(),
-            format!("block = {}", block(mesh)),
+            geometry(host),
         ];
         tissue_lines(tissue, &mut lines);
         regions.iter().for_each(|region| region_lines(region, &mut lines));
@@ -108,9 +108,22 @@ impl Scene {
     }
 }
 
-fn block(block: &BlockSpec) -> String {
-    let BlockSpec { origin_mm, size_mm, elements } = block;
-    format!("{{ origin_mm = {}, size_mm = {}, elements = {elements:?} }}", numbers(origin_mm), numbers(size_mm))
+fn geometry(geometry: &GeometrySpec) -> String {
+    match geometry {
+        GeometrySpec::Block(BlockSpec { origin_mm, size_mm, elements }) => {
+            let (origin_mm, size_mm) = (numbers(origin_mm), numbers(size_mm));
+            format!("block = {{ origin_mm = {origin_mm}, size_mm = {size_mm}, elements = {elements:?} }}")
+        }
+        GeometrySpec::Exf(ExfSpec { path: file, field }) => {
+            let field = field.as_ref().map(|field| format!("\nfield = {}", text(field))).unwrap_or_default();
+            format!("exf = {}{field}", path(file))
+        }
+    }
+}
+
+fn faces(FaceSpec(names): &FaceSpec) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
+    if let [one] = &quoted[..] { one.clone() } else { format!("[{}]", quoted.join(", ")) }
 }
 
 fn tissue_lines(tissue: &TissueSpec, lines: &mut Vec<String>) {
@@ -160,19 +173,20 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
 }
 
 fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
-    let MuscleSpec { name, block: muscle_block, element, fibres, activation, gauss, blemker, place: _ } = muscle;
+    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, blemker, place: _ } = muscle;
     let activation = match activation {
         ActivationSpec::Uniform => "uniform",
         ActivationSpec::Field => "field",
     };
     let ElementSpec::Trilinear = element;
     let BlemkerSpec { sigma_max_kpa, lambda_star, lambda_ofl, p1, p2 } = blemker;
+    lines.extend(["\n[[muscle]]".into(), format!("name = {}", text(name)), geometry(shape)]);
+    if let GeometrySpec::Block(_) = shape {
+        lines.push("element = \"trilinear\"".into());
+    }
     lines.extend([
-        "\n[[muscle]]".into(),
-        format!("name = {}", text(name)),
-        format!("block = {}", block(muscle_block)),
-        "element = \"trilinear\"".into(),
         match fibres {
+            FibresSpec::Field(field) => format!("angles_field = {}", text(field)),
             FibresSpec::Uniform(angles) => format!("fibre_angles_deg = {}", numbers(angles)),
             FibresSpec::Nodes(nodes) => {
                 nodes.iter().fold("fibre_angles_nodes_deg = [\n".to_string(), |list, angles| {
@@ -195,13 +209,14 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
 
 fn support_line(kind: &SupportKind) -> String {
     match kind {
-        SupportKind::Clamp { face } => format!("clamp = {{ face = \"{face}\" }}"),
-        SupportKind::Symmetry { face } => format!("symmetry = {{ face = \"{face}\" }}"),
+        SupportKind::Clamp { face } => format!("clamp = {{ face = {} }}", faces(face)),
+        SupportKind::Symmetry { face } => format!("symmetry = {{ face = {} }}", faces(face)),
         SupportKind::Plate { face, offset_mm } => {
-            format!("plate = {{ face = \"{face}\", offset_mm = {} }}", number(*offset_mm))
+            format!("plate = {{ face = {}, offset_mm = {} }}", faces(face), number(*offset_mm))
         }
         SupportKind::Rotate { face, axis, through_mm, angle_deg } => format!(
-            "rotate = {{ face = \"{face}\", axis = {}, through_mm = {}, angle_deg = {} }}",
+            "rotate = {{ face = {}, axis = {}, through_mm = {}, angle_deg = {} }}",
+            faces(face),
             numbers(axis),
             numbers(through_mm),
             number(*angle_deg)
@@ -265,7 +280,9 @@ fn law_entry(law: &ContactLawSpec) -> String {
 
 fn load_line(kind: &LoadKind) -> String {
     match kind {
-        LoadKind::Traction { face, kpa } => format!("traction = {{ face = \"{face}\", kpa = {} }}", numbers(kpa)),
+        LoadKind::Traction { face, kpa } => {
+            format!("traction = {{ face = {}, kpa = {} }}", faces(face), numbers(kpa))
+        }
         LoadKind::Gravity { density_kg_m3, acceleration_m_s2 } => format!(
             "gravity = {{ density_kg_m3 = {}, acceleration_m_s2 = {} }}",
             number(*density_kg_m3),

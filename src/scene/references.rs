@@ -3,7 +3,7 @@
 use super::Curves;
 use super::cursor::{ACTIVATION, Item, Mistakes};
 use super::nearest::nearest;
-use super::spec::{ActivationSpec, ControlSpec, ControlValue, MuscleSpec};
+use super::spec::{ActivationSpec, ControlSpec, ControlValue, GeometrySpec, MuscleSpec};
 use super::tree::{Entry, Node, Value};
 use crate::error::{Error, Place};
 use std::cell::RefCell;
@@ -145,7 +145,12 @@ fn nodes(control: &Item, muscle: Option<&MuscleSpec>) -> Option<ControlValue> {
         return control.number(ACTIVATION).map(ControlValue::Constant);
     }
     let values = control.list("a list of numbers", |item| item.number(ACTIVATION))?;
-    match muscle.map(|muscle| muscle.block.nodes()) {
+    // the nodes of a mesh in a file are counted when the model is built
+    let count = muscle.and_then(|muscle| match &muscle.geometry {
+        GeometrySpec::Block(block) => Some(block.nodes()),
+        GeometrySpec::Exf(_) => None,
+    });
+    match count {
         Some(count) if count != values.len() => control.wrong_length(
             &format!("activations for {} nodes", values.len()),
             &format!("{count}, one for each node of the block, x fastest"),

@@ -21,11 +21,31 @@ pub enum Task {
 /// The host body: `[mesh]`.
 #[derive(Debug, Clone, Serialize)]
 pub struct MeshSpec {
-    /// A box of tricubic Hermite elements.
-    pub block: BlockSpec,
+    /// Where the body lies before anything moves: a block of tricubic Hermite elements, or the mesh of an EX file.
+    #[serde(flatten)]
+    pub geometry: GeometrySpec,
     /// The table in the file.
     #[serde(skip)]
     pub place: Place,
+}
+
+/// Where a mesh comes from.
+#[derive(Debug, Clone, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GeometrySpec {
+    /// A box.
+    Block(BlockSpec),
+    /// An EX file: `exf = "face.exf"`, and which of its fields holds the coordinates.
+    Exf(ExfSpec),
+}
+
+/// A mesh in an EX file, in mm.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExfSpec {
+    /// The file.
+    pub path: PathBuf,
+    /// The field of coordinates: `field`; without it `coordinates`, or the only one there is.
+    pub field: Option<String>,
 }
 
 /// A box along the axes, cut into equal elements; xi1, xi2, xi3 run along x, y, z.
@@ -144,8 +164,9 @@ pub struct MuscleSpec {
     /// Its name, unique among muscles; its control carries the same name.
     pub name: String,
     /// Where the muscle lies before anything moves.
-    pub block: BlockSpec,
-    /// The elements of the muscle's own mesh.
+    #[serde(flatten)]
+    pub geometry: GeometrySpec,
+    /// The elements of the muscle's own mesh, if it is a block; an EX file brings its own.
     pub element: ElementSpec,
     /// The direction of its fibres.
     pub fibres: FibresSpec,
@@ -186,6 +207,8 @@ pub enum FibresSpec {
     Uniform([f64; 3]),
     /// `fibre_angles_nodes_deg`: angles at the nodes of the block, x fastest, then y, then z.
     Nodes(Vec<[f64; 3]>),
+    /// `angles_field`: a field of the muscle's EX file, in radians there.
+    Field(String),
 }
 
 /// The constants of the fibre law of Blemker et al. 2005.
@@ -214,7 +237,7 @@ pub struct SupportSpec {
 }
 
 /// The kinds of support.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SupportKind {
     /// The face does not move.
@@ -247,23 +270,50 @@ pub enum SupportKind {
     },
 }
 
-/// A part of the host's surface.
+/// A part of the host's surface: all faces with any of these names; at least one name.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct FaceSpec(pub Vec<FaceName>);
+
+/// How faces of the host are named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum FaceSpec {
-    /// A whole side of a block: `"xi1=0"` is direction 0, end 0.
-    BlockSide {
+pub enum FaceName {
+    /// `"boundary"`: the whole surface.
+    Boundary,
+    /// `"xi1=0"` is direction 0, end 0: a whole side of a block, and of any mesh all boundary faces that are this side
+    /// of their element.
+    Side {
         /// 0, 1, 2 for xi1, xi2, xi3.
         direction: usize,
         /// 0 or 1: where that coordinate is smallest or greatest.
         end: usize,
     },
+    /// `"7:xi1=0"`: one face of a mesh from an EX file.
+    OfElement {
+        /// The identifier of the element in the file.
+        element: i64,
+        /// 0, 1, 2 for xi1, xi2, xi3.
+        direction: usize,
+        /// 0 or 1.
+        end: usize,
+    },
+}
+
+impl std::fmt::Display for FaceName {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            FaceName::Boundary => write!(out, "boundary"),
+            FaceName::Side { direction, end } => write!(out, "xi{}={end}", direction + 1),
+            FaceName::OfElement { element, direction, end } => write!(out, "{element}:xi{}={end}", direction + 1),
+        }
+    }
 }
 
 impl std::fmt::Display for FaceSpec {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let FaceSpec::BlockSide { direction, end } = self;
-        write!(out, "xi{}={end}", direction + 1)
+        let names: Vec<String> = self.0.iter().map(FaceName::to_string).collect();
+        write!(out, "{}", names.join(", "))
     }
 }
 
@@ -379,7 +429,7 @@ pub struct LoadSpec {
 }
 
 /// The kinds of load.
-#[derive(Debug, Clone, Copy, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LoadKind {
     /// A dead force per reference area of a face.

@@ -74,13 +74,13 @@ fn tables_and_shapes_show_the_pressure() {
 fn an_initial_penetration_is_never_silent() {
     let behind = PROBLEM.replace("through_mm = [0, 0, 0]", "through_mm = [0, 0, 0.5]");
     let error = build(&scene(&behind)).err().expect("it starts behind the plane");
-    assert_eq!(error.code(), "G009");
+    assert_eq!(error.code(), "G022");
     assert!(error.to_string().contains("-5.000e-1 mm"), "{error}");
     assert_eq!(error.place().map(|place| &*place.text), Some("[[contact]]"));
 
     let relaxed = behind.replace("law = { penalty", "initial = \"relax\"\nlaw = { penalty");
     let built = build(&scene(&relaxed)).expect("a model");
-    assert_eq!(built.warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["G008"]);
+    assert_eq!(built.warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["G023"]);
     let model = &built.model;
     // at rest nothing is pressed; at full load the face is where the load wants it
     let rest = contact_states(model, &model.rest())[0];
