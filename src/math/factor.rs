@@ -5,8 +5,9 @@
 //! ```
 //!
 //! The structure of L depends on the pattern alone: [`Symbolic`] holds it, once per model. [`Factor`] holds numbers and
-//! is refilled in place. Pivots are chosen within dense blocks of columns that share their structure (Bunch and
-//! Kaufman 1977), so L never grows beyond what [`Symbolic`] predicts.
+//! is refilled in place. Unknowns are eliminated in dense fronts along a tree (Duff and Reid 1983); pivots are chosen
+//! within blocks of a front (Bunch and Kaufman 1977), so L never grows beyond what [`Symbolic`] predicts. Threads share
+//! the subtrees, and the strips of large fronts; who computes what does not change how it is computed.
 //!
 //! Solves are refined against a matrix that may be newer than the factored one. Results have the same bits for any
 //! number of threads.
@@ -23,7 +24,7 @@ use super::sparse::{BlockPattern, SymmetricMatrix};
 use crate::{Error, Result};
 use equilibrate::equilibrate;
 use front::{Contribution, Panel, Pool, Source};
-use tree::Tree;
+use tree::{Front, Tree};
 
 mod equilibrate;
 mod front;
@@ -50,10 +51,15 @@ impl Symbolic {
     /// Finds the structure of L for `pattern` eliminated in the order `ordering`.
     ///
     /// # Errors
-    /// [`Error::FactorTooLarge`] if the structure does not fit into memory.
+    /// [`Error::FactorTooLarge`] if the numbers of the factor could not be addressed.
     pub fn new(pattern: Arc<BlockPattern>, ordering: &Ordering) -> Result<Arc<Self>> {
         let tree = Tree::new(&pattern, ordering);
-        Ok(Arc::new(Self { pattern, tree, flops: ordering.flops, factor_nnz: ordering.factor_nnz }))
+        let symbolic = Self { pattern, tree, flops: ordering.flops, factor_nnz: ordering.factor_nnz };
+        let entries = |sum: usize, front: &Front| sum.checked_add(front.width().checked_mul(front.height())?);
+        match symbolic.tree.fronts.iter().try_fold(0, entries) {
+            Some(entries) if entries <= isize::MAX as usize / size_of::<f64>() => Ok(Arc::new(symbolic)),
+            _ => Err(symbolic.too_large()),
+        }
     }
 
     /// The pattern of the matrices that can be factored.
@@ -159,8 +165,9 @@ impl Factor {
     /// Factors `a` in place of what was factored before.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a value of `a` is NaN or infinite, [`Error::Singular`] if a pivot vanishes. The factor
-    /// then solves nothing until it is refilled.
+    /// [`Error::NotFinite`] if a value of `a` is NaN or infinite, [`Error::Singular`] if a pivot vanishes,
+    /// [`Error::FactorTooLarge`] if there is no memory for the fronts. The factor then solves nothing until it is
+    /// refilled.
     ///
     /// # Panics
     /// If `a` has another pattern.
@@ -279,7 +286,9 @@ impl Factor {
                 };
                 for eigenvalue in [mean + radius, mean - radius].into_iter().take(order) {
                     if !eigenvalue.is_finite() || eigenvalue == 0.0 {
-                        let unknown = tree.permutation[front.pivots.start + panel.exchanges[j]];
+                        let start = front.pivot_blocks.iter().map(|block| block.start).rfind(|&start| start <= j);
+                        let first = front.pivots.start + start.unwrap_or(0);
+                        let unknown = tree.permutation[first + panel.exchanges[j]];
                         return Err(Error::Singular { unknown });
                     }
                     match eigenvalue {

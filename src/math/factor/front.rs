@@ -6,6 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::lblt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::matmul;
+use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, ColMut, MatMut, MatRef, Par};
@@ -15,9 +16,9 @@ use super::tree::{Front, Run};
 use crate::math::sparse::SymmetricMatrix;
 
 /// Columns of a contribution that are computed and stored together.
-const STRIP: usize = 64;
+const STRIP: usize = 128;
 /// Rows below the pivots that are solved together.
-const CHUNK: usize = 128;
+const CHUNK: usize = 256;
 /// Operations of a front above which its strips and chunks are shared among threads.
 const LEAST_SHARED: f64 = 2e7;
 
@@ -28,7 +29,7 @@ pub(super) struct Panel {
     pub values: Vec<f64>,
     /// Entries of B below its diagonal, 0 where a block of order 1 ends; one per pivot.
     pub subdiagonal: Vec<f64>,
-    /// Pivot eliminated at each place, counted from the first of the front.
+    /// Pivot eliminated at each place, counted from the first of its block.
     pub exchanges: Vec<usize>,
     /// The inverse of `exchanges`.
     inverse: Vec<usize>,
@@ -132,35 +133,11 @@ impl Source<'_> {
         let is_shared = front.flops > LEAST_SHARED;
         self.assemble(front, &mut panel.values, &children);
 
-        let whole = MatMut::from_column_major_slice_mut(&mut panel.values, width + below, width);
-        let (mut pivots, rows) = whole.split_at_row_mut(width);
-        panel.subdiagonal.fill(0.0);
-        let need = cholesky_in_place_scratch::<usize, f64>(width, Par::Seq, Default::default());
-        let mut scratch = MemBuffer::try_new(need).ok()?;
-        cholesky_in_place(
-            pivots.rb_mut(),
-            ColMut::from_slice_mut(&mut panel.subdiagonal).as_diagonal_mut(),
-            &mut panel.exchanges,
-            &mut panel.inverse,
-            Par::Seq,
-            MemStack::new(&mut scratch),
-            Default::default(),
-        );
-
-        // L21 B = F21 L11^-T
-        let mut buffer = self.pool.take(below * width)?;
-        let pivots = pivots.rb();
-        let (subdiagonal, exchanges) = (&panel.subdiagonal, &panel.exchanges);
-        let product = MatMut::from_column_major_slice_mut(&mut buffer, below, width);
-        let chunks: Vec<_> = chunks_of_rows(rows).into_iter().zip(chunks_of_rows(product)).collect();
-        for_each(is_shared, chunks, |(rows, product)| {
-            solve_rows(pivots, subdiagonal, exchanges, rows, product);
-        });
-
-        let mut contribution =
-            Contribution { order: below, values: self.pool.take(Contribution::entries(below))? };
+        let mut product = self.pool.take((width + below) * width)?;
+        eliminate(front, panel, &mut product, is_shared)?;
+        let mut contribution = Contribution { order: below, values: self.pool.take(Contribution::entries(below))? };
         let (_, l21) = panel.blocks(front);
-        let times_b = MatRef::from_column_major_slice(&buffer, below, width);
+        let times_b = MatRef::from_column_major_slice(&product, width + below, width).split_at_row(width).1;
         let mut strips = Vec::new();
         let mut rest = contribution.values.as_mut_slice();
         for first in (0..below).step_by(STRIP) {
@@ -174,12 +151,26 @@ impl Source<'_> {
             let l = l21.subrows(columns.start, rows);
             let bl = times_b.subrows(columns.start, columns.len());
             let product = MatMut::from_column_major_slice_mut(strip, rows, columns.len());
-            matmul(product, Accum::Replace, l, bl.transpose(), -1.0, Par::Seq);
+            let (triangle, rectangle) = product.split_at_row_mut(columns.len());
+            let (l_triangle, l_rectangle) = l.split_at_row(columns.len());
+            triangular::matmul(
+                triangle,
+                BlockStructure::TriangularLower,
+                Accum::Replace,
+                l_triangle,
+                BlockStructure::Rectangular,
+                bl.transpose(),
+                BlockStructure::Rectangular,
+                -1.0,
+                Par::Seq,
+            );
+            matmul(rectangle, Accum::Replace, l_rectangle, bl.transpose(), -1.0, Par::Seq);
             for (child, added) in &children {
-                add_columns(added, &child.to_parent, width, columns.clone(), rows, strip);
+                let columns = columns.start + width..columns.end + width;
+                add_columns(added, &child.to_parent, columns.clone(), columns.start, rows, strip);
             }
         });
-        self.pool.give(buffer);
+        self.pool.give(product);
         for (_, child) in children {
             self.pool.give(child.values);
         }
@@ -195,7 +186,14 @@ impl Source<'_> {
     fn assemble(&self, front: &Front, values: &mut [f64], children: &[(&Front, Contribution)]) {
         let pattern = &*self.matrix.pattern;
         let height = front.height();
-        values.fill(0.0);
+        let strips: Vec<_> = values.chunks_mut(STRIP * height).enumerate().collect();
+        for_each(front.flops > LEAST_SHARED, strips, |(strip, values)| {
+            values.fill(0.0);
+            let first = strip * STRIP;
+            for (child, added) in children {
+                add_columns(added, &child.to_parent, first..first + values.len() / height, 0, height, values);
+            }
+        });
         for block in &front.blocks {
             let (columns, rows) = (pattern.unknowns(block.column), pattern.unknowns(block.row));
             let is_diagonal = block.column == block.row;
@@ -209,32 +207,28 @@ impl Source<'_> {
                 if block.transposed {
                     let first = block.place[0] + a + block.place[1] * height;
                     let row = values[first..].iter_mut().step_by(height);
-                    row.zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f = a * s * t);
+                    row.zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f += a * s * t);
                 } else {
                     let first = block.place[0] + skipped + (block.place[1] + a) * height;
                     let column = &mut values[first..first + entries.len()];
-                    column.iter_mut().zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f = a * s * t);
+                    column.iter_mut().zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f += a * s * t);
                 }
             }
-        }
-        for (child, added) in children {
-            add_columns(added, &child.to_parent, 0, 0..front.width(), height, values);
         }
     }
 }
 
-/// Adds to `columns` of the parent, counted from its column `origin`, what a child contributes to them.
+/// Adds to `columns` of the parent, counted from its first pivot, what a child contributes to them.
 ///
-/// `values` holds these columns by columns of `height` rows that start at the row of the first column.
+/// `values` holds these columns, of `height` rows each, from row `first_row` of the parent down.
 fn add_columns(
     child: &Contribution,
     runs: &[Run],
-    origin: usize,
     columns: Range<usize>,
+    first_row: usize,
     height: usize,
     values: &mut [f64],
 ) {
-    let columns = columns.start + origin..columns.end + origin;
     for (place, run) in runs.iter().enumerate() {
         for to in run.to.max(columns.start)..(run.to + run.len).min(columns.end) {
             let from = run.from + to - run.to;
@@ -244,11 +238,60 @@ fn add_columns(
             for rows in std::iter::once(&first).chain(&runs[place + 1..]) {
                 let (added, rest) = source.split_at(rows.len);
                 source = rest;
-                let start = rows.to - columns.start;
+                let start = rows.to - first_row;
                 target[start..start + rows.len].iter_mut().zip(added).for_each(|(t, s)| *t += s);
             }
         }
     }
+}
+
+/// Factors the columns of the pivots, block after block; `product` receives L B below each block.
+///
+/// ```text
+/// F_ik -= sum_{m < k} L_im (L_km B_m)^T      all rows i of block k
+/// F_kk = P^T L_kk B_k L_kk^T P,   L_ik B_k = F_ik P^T L_kk^-T     rows below block k
+/// ```
+///
+/// P stays in the block: rows of L that belong to a later block are in the order before its exchanges.
+fn eliminate(front: &Front, panel: &mut Panel, product: &mut [f64], is_shared: bool) -> Option<()> {
+    let (width, height) = (front.width(), front.height());
+    let mut l = MatMut::from_column_major_slice_mut(&mut panel.values, height, width);
+    let mut product = MatMut::from_column_major_slice_mut(product, height, width);
+    let widest = front.pivot_blocks.iter().map(ExactSizeIterator::len).max()?;
+    let need = cholesky_in_place_scratch::<usize, f64>(widest, Par::Seq, Default::default());
+    let mut scratch = MemBuffer::try_new(need).ok()?;
+    panel.subdiagonal.fill(0.0);
+    for block in &front.pivot_blocks {
+        let (start, len) = (block.start, block.len());
+        let (before, columns) = l.rb_mut().split_at_col_mut(start);
+        let (before, columns) =
+            (before.rb().subrows(start, height - start), columns.subrows_mut(start, height - start));
+        let (products_before, products) = product.rb_mut().split_at_col_mut(start);
+        let of_block = products_before.rb().subrows(start, len);
+        let (mut pivots, rows) = columns.subcols_mut(0, len).split_at_row_mut(len);
+        matmul(pivots.rb_mut(), Accum::Add, before.subrows(0, len), of_block.transpose(), -1.0, Par::Seq);
+        let subdiagonal = &mut panel.subdiagonal[block.clone()];
+        let exchanges = &mut panel.exchanges[block.clone()];
+        cholesky_in_place(
+            pivots.rb_mut(),
+            ColMut::from_slice_mut(subdiagonal).as_diagonal_mut(),
+            exchanges,
+            &mut panel.inverse[block.clone()],
+            Par::Seq,
+            MemStack::new(&mut scratch),
+            Default::default(),
+        );
+
+        let pivots = pivots.rb();
+        let products = products.subcols_mut(0, len).subrows_mut(start + len, height - start - len);
+        let chunks: Vec<_> = chunks_of_rows(rows).into_iter().zip(chunks_of_rows(products)).enumerate().collect();
+        for_each(is_shared, chunks, |(chunk, (mut rows, product))| {
+            let before = before.subrows(len + chunk * CHUNK, rows.nrows());
+            matmul(rows.rb_mut(), Accum::Add, before, of_block.transpose(), -1.0, Par::Seq);
+            solve_rows(pivots, subdiagonal, exchanges, rows, product);
+        });
+    }
+    Some(())
 }
 
 /// The rows of a matrix in pieces of [`CHUNK`].
@@ -264,7 +307,7 @@ fn chunks_of_rows(matrix: MatMut<'_, f64>) -> Vec<MatMut<'_, f64>> {
     chunks
 }
 
-/// `rows` holds rows of F21 and receives those of L21; `product` receives L21 B.
+/// `rows` holds rows below a block of pivots and receives those of L; `product` receives L B.
 fn solve_rows(
     pivots: MatRef<'_, f64>,
     subdiagonal: &[f64],
@@ -281,9 +324,8 @@ fn solve_rows(
     while j < exchanges.len() {
         if subdiagonal[j] == 0.0 {
             let inverse = 1.0 / pivots[(j, j)];
-            for i in 0..rows.nrows() {
-                rows[(i, j)] = product[(i, j)] * inverse;
-            }
+            let column = rows.rb_mut().col_mut(j);
+            column.iter_mut().zip(product.col(j).iter()).for_each(|(l, p)| *l = p * inverse);
             j += 1;
         } else {
             let inverse = Inverse::new(pivots[(j, j)], subdiagonal[j], pivots[(j + 1, j + 1)]);

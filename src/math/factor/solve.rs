@@ -1,9 +1,7 @@
 //! Forward and backward substitution over the fronts.
 
 use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::{
-    solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place,
-};
+use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 
@@ -15,16 +13,36 @@ pub(super) fn solve(tree: &Tree, panels: &[Panel], x: &mut [f64], columns: usize
     let n = tree.permutation.len();
     let widest = tree.fronts.iter().map(Front::width).max().unwrap_or(0);
     let highest = tree.fronts.iter().map(|front| front.below).max().unwrap_or(0);
+    let mut exchanged = vec![0.0; widest];
     let (mut pivots, mut below) = (vec![0.0; widest * columns], vec![0.0; highest * columns]);
     for (front, panel) in tree.fronts.iter().zip(panels) {
         let (l11, l21) = panel.blocks(front);
         let pivots = &mut pivots[..front.width() * columns];
         let below = &mut below[..front.below * columns];
-        take_pivots(front, panel, x, pivots, n);
-        let mut y = MatMut::from_column_major_slice_mut(pivots, front.width(), columns);
-        solve_unit_lower_triangular_in_place(l11, y.rb_mut(), Par::Seq);
+        for (x, pivots) in x.chunks(n).zip(pivots.chunks_mut(front.width())) {
+            let x = &x[front.pivots.clone()];
+            pivots.copy_from_slice(x);
+        }
+        for block in &front.pivot_blocks {
+            for y in pivots.chunks_mut(front.width()) {
+                exchanged[..block.len()].copy_from_slice(&y[block.clone()]);
+                y[block.clone()]
+                    .iter_mut()
+                    .zip(&panel.exchanges[block.clone()])
+                    .for_each(|(y, &from)| *y = exchanged[from]);
+            }
+            let y = MatMut::from_column_major_slice_mut(pivots, front.width(), columns);
+            let (mut y, later) =
+                y.subrows_mut(block.start, front.width() - block.start).split_at_row_mut(block.len());
+            let (l, l_later) = l11
+                .submatrix(block.start, block.start, front.width() - block.start, block.len())
+                .split_at_row(block.len());
+            solve_unit_lower_triangular_in_place(l, y.rb_mut(), Par::Seq);
+            matmul(later, Accum::Add, l_later, y.rb(), -1.0, Par::Seq);
+        }
+        let y = MatRef::from_column_major_slice(pivots, front.width(), columns);
         let product = MatMut::from_column_major_slice_mut(below, front.below, columns);
-        matmul(product, Accum::Replace, l21, y.rb(), 1.0, Par::Seq);
+        matmul(product, Accum::Replace, l21, y, 1.0, Par::Seq);
         if front.below > 0 {
             for (x, below) in x.chunks_mut(n).zip(below.chunks(front.below)) {
                 let mut below = below;
@@ -60,19 +78,23 @@ pub(super) fn solve(tree: &Tree, panels: &[Panel], x: &mut [f64], columns: usize
             let below = MatRef::from_column_major_slice(below, front.below, columns);
             matmul(y.rb_mut(), Accum::Add, l21.transpose(), below, -1.0, Par::Seq);
         }
-        solve_unit_upper_triangular_in_place(l11.transpose(), y.rb_mut(), Par::Seq);
-        for (x, pivots) in x.chunks_mut(n).zip(pivots.chunks(front.width())) {
-            let x = &mut x[front.pivots.clone()];
-            panel.exchanges.iter().zip(pivots).for_each(|(&to, y)| x[to] = *y);
+        for block in front.pivot_blocks.iter().rev() {
+            let y = y.rb_mut().subrows_mut(block.start, front.width() - block.start);
+            let (mut y, later) = y.split_at_row_mut(block.len());
+            let (l, l_later) = l11
+                .submatrix(block.start, block.start, front.width() - block.start, block.len())
+                .split_at_row(block.len());
+            matmul(y.rb_mut(), Accum::Add, l_later.transpose(), later.rb(), -1.0, Par::Seq);
+            solve_unit_upper_triangular_in_place(l.transpose(), y.rb_mut(), Par::Seq);
+            for column in 0..columns {
+                let mut y = y.rb_mut().col_mut(column);
+                exchanged.iter_mut().zip(y.rb().iter()).for_each(|(e, y)| *e = *y);
+                panel.exchanges[block.clone()].iter().zip(&exchanged).for_each(|(&to, e)| y[to] = *e);
+            }
         }
-    }
-}
-
-/// Copies the pivots of `x` in the order in which the front eliminated them.
-fn take_pivots(front: &Front, panel: &Panel, x: &[f64], pivots: &mut [f64], n: usize) {
-    for (x, pivots) in x.chunks(n).zip(pivots.chunks_mut(front.width())) {
-        let x = &x[front.pivots.clone()];
-        pivots.iter_mut().zip(&panel.exchanges).for_each(|(y, &from)| *y = x[from]);
+        for (x, pivots) in x.chunks_mut(n).zip(pivots.chunks(front.width())) {
+            x[front.pivots.clone()].copy_from_slice(pivots);
+        }
     }
 }
 

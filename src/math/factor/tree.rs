@@ -20,6 +20,8 @@ use super::super::sparse::BlockPattern;
 const MOVE: f64 = 60.0;
 /// Time to begin a front, in operations.
 const BEGIN: f64 = 2e5;
+/// Most pivots of a block.
+const WIDEST: usize = 104;
 /// Fronts below a subtree are worth another thread above this number of operations,
 const LEAST_TASK: f64 = 4e6;
 /// and above this part of all operations, which bounds the depth of the recursion.
@@ -40,6 +42,8 @@ pub(super) struct Tree {
 pub(super) struct Front {
     /// Places of the pivots in [`Tree::permutation`].
     pub pivots: Range<usize>,
+    /// Pivots among which a pivot is chosen, counted from the first of the front; whole groups, in order.
+    pub pivot_blocks: Vec<Range<usize>>,
     /// Number of rows below the pivots.
     pub below: usize,
     /// Places of the rows below, as the fewest ranges, ascending.
@@ -160,15 +164,24 @@ impl Tree {
         for (f, &k) in sequence.iter().enumerate() {
             let draft = &drafts[k];
             let first_pivot = permutation.len();
+            let mut pivot_blocks: Vec<Range<usize>> = Vec::new();
+            // blocks about equal, none wider than the limit unless a group is
+            let width = draft.width.div_ceil(draft.width.div_ceil(WIDEST));
             for &place in &draft.pivots {
                 let g = order[place];
                 start[g] = permutation.len();
                 front_of[g] = f;
                 permutation.extend(pattern.unknowns(g));
+                let end = permutation.len() - first_pivot;
+                match pivot_blocks.last_mut() {
+                    Some(block) if end - block.start <= width => block.end = end,
+                    _ => pivot_blocks.push(start[g] - first_pivot..end),
+                }
             }
             let heavy = |c: &&usize| work[**c] > LEAST_TASK && work[**c] > TASK_PART * total;
             fronts.push(Front {
                 pivots: first_pivot..permutation.len(),
+                pivot_blocks,
                 below: draft.below,
                 below_runs: Vec::new(),
                 blocks: Vec::new(),
