@@ -1,11 +1,15 @@
 //! Scaling of rows and columns, so that pivots of unlike units can be compared.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::math::sparse::SymmetricMatrix;
 
 /// A row with a zero diagonal gets its scale from the rows it couples to.
 const PASSES: usize = 3;
+/// Partial maxima, because one would wait for itself at every entry.
+const LANES: usize = 8;
 
 /// s_i such that the largest |s_i a_ij s_j| of every row comes close to one (Ruiz 2001), rounded to powers of two.
 ///
@@ -32,7 +36,7 @@ pub(super) fn equilibrate(a: &SymmetricMatrix, scale: &mut [f64]) {
 }
 
 /// max_j |s_i a_ij s_j| over the columns of `groups` and their mirror images.
-fn row_maxima(a: &SymmetricMatrix, scale: &[f64], groups: std::ops::Range<usize>) -> Vec<f64> {
+fn row_maxima(a: &SymmetricMatrix, scale: &[f64], groups: Range<usize>) -> Vec<f64> {
     let pattern = &*a.pattern;
     let mut largest = vec![0.0_f64; scale.len()];
     let mut runs = Vec::new();
@@ -64,6 +68,3 @@ fn row_maxima(a: &SymmetricMatrix, scale: &[f64], groups: std::ops::Range<usize>
     }
     largest
 }
-
-/// Partial maxima, because one would wait for itself at every entry.
-const LANES: usize = 8;
