@@ -296,8 +296,9 @@ fn the_order_costs_less_than_approximate_minimum_degree_on_the_unknowns() {
 
 #[test]
 fn bits_do_not_depend_on_the_number_of_threads() {
-    for pressure in [Pressure::Continuous, Pressure::Discontinuous] {
-        let grid = Grid::new([8, 6, 1], pressure, |_| 24);
+    // fronts large enough to be shared among threads
+    for (cells, pressure) in [([14, 10, 1], Pressure::Continuous), ([8, 6, 1], Pressure::Discontinuous)] {
+        let grid = Grid::new(cells, pressure, |_| 24);
         let pattern = grid.pattern();
         let matrix = grid.matrix(&pattern, 1, 10.0, 1.0);
         let newer = grid.matrix(&pattern, 1, 12.0, 1.0);
@@ -312,6 +313,22 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         let one = run(1);
         assert!(one == run(2) && one == run(4));
     }
+}
+
+#[test]
+fn parts_that_do_not_touch_are_solved_side_by_side() {
+    let mut grid = Grid::new([6, 2, 1], Pressure::Continuous, |_| 24);
+    // no element between the third and the fourth row of nodes
+    grid.cliques.retain(|clique| clique[0] % 7 != 2);
+    let matrix = grid.matrix(&grid.pattern(), 4, 10.0, 1.0);
+    let b = Random(3).vector(matrix.pattern.n());
+    let mut x = b.clone();
+    let mut factor = factored(&grid, &matrix);
+    let quality = factor.solve(&matrix, &mut x, 1, 1e-13).unwrap();
+    let mut product = vec![0.0; b.len()];
+    matrix.multiply(&x, &mut product);
+    assert!(quality.residual <= 1e-13 && difference(&product, &b) <= 1e-11 * norm(&b), "{quality:?}");
+    assert_eq!(factor.inertia(), grid.expected_inertia());
 }
 
 #[test]

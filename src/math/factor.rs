@@ -5,8 +5,9 @@
 //! ```
 //!
 //! The structure of L depends on the pattern alone: [`Symbolic`] holds it, once per model. [`Factor`] holds numbers and
-//! is refilled in place. Pivots are chosen within dense blocks of columns that share their structure (Bunch and
-//! Kaufman 1977), so L never grows beyond what [`Symbolic`] predicts.
+//! is refilled in place. Unknowns are eliminated in dense fronts along a tree (Duff and Reid 1983); pivots are chosen
+//! within blocks of a front (Bunch and Kaufman 1977), so L never grows beyond what [`Symbolic`] predicts. Threads share
+//! the subtrees, and the strips of large fronts; who computes what does not change how it is computed.
 //!
 //! Solves are refined against a matrix that may be newer than the factored one. Results have the same bits for any
 //! number of threads.
@@ -15,30 +16,25 @@ use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::perm::PermRef;
-use faer::sparse::SparseColMatRef;
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::cholesky::supernodal::SupernodalIntranodeLbltRef;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, IntranodeLbltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::{Conj, MatMut, Par, Side};
 use rayon::prelude::*;
 
 use super::ordering::Ordering;
 use super::refine;
 use super::sparse::{BlockPattern, SymmetricMatrix};
 use crate::{Error, Result};
+use equilibrate::equilibrate;
+use front::{Contribution, Panel, Pool, Source};
+use tree::{Front, Tree};
 
-/// Dense products run on the calling thread. faer can cut them, but the fronts of a thin body are so small that two
-/// threads gain nothing, and the cut would change the bits.
-const PARALLELISM: Par = Par::Seq;
+mod equilibrate;
+mod front;
+mod solve;
+mod tree;
+
 /// Right-hand sides solved together by one thread.
-const BATCH: usize = 8;
-/// Passes of equilibration: a row with a zero diagonal gets its scale from the rows it couples to.
-const EQUILIBRATION_PASSES: usize = 3;
+const BATCH: usize = 16;
+/// Numbers checked together by one thread.
+const CHECKED: usize = 1 << 16;
 /// A pivot of the equilibrated matrix below this is rounding, not a number.
 const ZERO_PIVOT: f64 = 64.0 * f64::EPSILON;
 
@@ -46,7 +42,7 @@ const ZERO_PIVOT: f64 = 64.0 * f64::EPSILON;
 #[derive(Debug)]
 pub struct Symbolic {
     pattern: Arc<BlockPattern>,
-    cholesky: SymbolicCholesky<usize>,
+    tree: Tree,
     flops: f64,
     factor_nnz: usize,
 }
@@ -55,25 +51,24 @@ impl Symbolic {
     /// Finds the structure of L for `pattern` eliminated in the order `ordering`.
     ///
     /// # Errors
-    /// [`Error::FactorTooLarge`] if the structure does not fit into memory.
+    /// [`Error::FactorTooLarge`] if the numbers of the factor could not be addressed.
     pub fn new(pattern: Arc<BlockPattern>, ordering: &Ordering) -> Result<Arc<Self>> {
-        let n = pattern.n();
-        let mut inverse = vec![0; n];
-        ordering.permutation.iter().enumerate().for_each(|(place, &unknown)| inverse[unknown] = place);
-        let order = SymmetricOrdering::Custom(PermRef::new_checked(&ordering.permutation, &inverse, n));
-        let parameters = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..Default::default()
-        };
-        let factor_nnz = ordering.factor_nnz;
-        let cholesky = factorize_symbolic_cholesky(pattern.as_faer(), Side::Lower, order, parameters)
-            .map_err(|_| Error::FactorTooLarge { unknowns: n, entries: factor_nnz })?;
-        Ok(Arc::new(Self { pattern, cholesky, flops: ordering.flops, factor_nnz }))
+        let tree = Tree::new(&pattern, ordering);
+        let symbolic = Self { pattern, tree, flops: ordering.flops, factor_nnz: ordering.factor_nnz };
+        let entries = |sum: usize, front: &Front| sum.checked_add(front.width().checked_mul(front.height())?);
+        match symbolic.tree.fronts.iter().try_fold(0, entries) {
+            Some(entries) if entries <= isize::MAX as usize / size_of::<f64>() => Ok(Arc::new(symbolic)),
+            _ => Err(symbolic.too_large()),
+        }
     }
 
     /// The pattern of the matrices that can be factored.
     pub fn pattern(&self) -> &Arc<BlockPattern> {
         &self.pattern
+    }
+
+    fn too_large(&self) -> Error {
+        Error::FactorTooLarge { unknowns: self.pattern.n(), entries: self.factor_nnz }
     }
 
     /// Entries of L with its diagonal.
@@ -140,15 +135,9 @@ pub struct Factor {
     symbolic: Arc<Symbolic>,
     /// s_i, powers of two: scaling rounds nothing.
     scale: Vec<f64>,
-    /// S A S on the pattern of A.
-    scaled: Vec<f64>,
-    /// L and the diagonal of B, as faer lays them out.
-    values: Vec<f64>,
-    /// Entries of B below its diagonal.
-    subdiagonal: Vec<f64>,
-    /// Exchanges within supernodes: forward and inverse.
-    pivots: (Vec<usize>, Vec<usize>),
-    scratch: MemBuffer,
+    /// One for each front.
+    panels: Vec<Panel>,
+    pool: Pool,
     inertia: Inertia,
     is_valid: bool,
     work: Work,
@@ -160,20 +149,12 @@ impl Factor {
     /// # Errors
     /// [`Error::FactorTooLarge`] if there is not enough.
     pub fn new(symbolic: Arc<Symbolic>) -> Result<Self> {
-        let (n, entries) = (symbolic.pattern.n(), symbolic.factor_nnz);
-        let too_large = || Error::FactorTooLarge { unknowns: n, entries };
-        let mut values = Vec::new();
-        values.try_reserve_exact(symbolic.cholesky.len_val()).map_err(|_| too_large())?;
-        values.resize(symbolic.cholesky.len_val(), 0.0);
-        let need = symbolic.cholesky.factorize_numeric_intranode_lblt_scratch::<f64>(PARALLELISM, Default::default());
-        let scratch = MemBuffer::try_new(need).map_err(|_| too_large())?;
+        let n = symbolic.pattern.n();
+        let panels = symbolic.tree.fronts.iter().map(Panel::new).collect::<Option<_>>();
         Ok(Self {
             scale: vec![1.0; n],
-            scaled: vec![0.0; symbolic.pattern.nnz()],
-            values,
-            subdiagonal: vec![0.0; n],
-            pivots: ((0..n).collect(), (0..n).collect()),
-            scratch,
+            panels: panels.ok_or_else(|| symbolic.too_large())?,
+            pool: Pool::default(),
             inertia: Inertia::default(),
             is_valid: n == 0,
             work: Work::default(),
@@ -184,8 +165,9 @@ impl Factor {
     /// Factors `a` in place of what was factored before.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a value of `a` is NaN or infinite, [`Error::Singular`] if a pivot vanishes. The factor
-    /// then solves nothing until it is refilled.
+    /// [`Error::NotFinite`] if a value of `a` is NaN or infinite, [`Error::Singular`] if a pivot vanishes,
+    /// [`Error::FactorTooLarge`] if there is no memory for the fronts. The factor then solves nothing until it is
+    /// refilled.
     ///
     /// # Panics
     /// If `a` has another pattern.
@@ -193,25 +175,24 @@ impl Factor {
         let start = Instant::now();
         assert!(Arc::ptr_eq(&a.pattern, &self.symbolic.pattern), "the matrix has the pattern of the factor");
         self.is_valid = false;
-        if !a.values.iter().all(|value| value.is_finite()) {
+        let is_finite = |values: &[f64]| values.iter().fold(true, |all, value| all & value.is_finite());
+        if !a.values.par_chunks(CHECKED).all(is_finite) {
             return Err(Error::NotFinite);
         }
-        let pattern = &*self.symbolic.pattern;
-        let n = pattern.n();
-        if n > 0 {
-            equilibrate(a, &mut self.scale);
-            scale_symmetrically(a, &self.scale, &mut self.scaled);
-            self.symbolic.cholesky.factorize_numeric_intranode_lblt(
-                &mut self.values,
-                &mut self.subdiagonal,
-                &mut self.pivots.0,
-                &mut self.pivots.1,
-                SparseColMatRef::new(pattern.as_faer(), &self.scaled),
-                Side::Lower,
-                PARALLELISM,
-                MemStack::new(&mut self.scratch),
-                Default::default(),
-            );
+        equilibrate(a, &mut self.scale);
+        let tree = &self.symbolic.tree;
+        let source = Source { matrix: a, scale: &self.scale, pool: &self.pool };
+        let mut rest = self.panels.as_mut_slice();
+        let mut trees = Vec::new();
+        for &root in &tree.roots {
+            let (panels, others) = rest.split_at_mut(root + 1 - tree.fronts[root].first);
+            trees.push((root, panels));
+            rest = others;
+        }
+        let done: Option<Vec<_>> =
+            trees.into_par_iter().map(|(root, panels)| factor_subtree(&source, tree, root, panels)).collect();
+        for contribution in done.ok_or_else(|| self.symbolic.too_large())? {
+            source.release(contribution);
         }
         self.inertia = self.count_signs()?;
         self.is_valid = true;
@@ -255,23 +236,16 @@ impl Factor {
     /// x <- S P^T (L B L^T)^-1 P S x for each column.
     fn precondition(&self, x: &mut [f64]) {
         let n = self.scale.len();
-        let cholesky = &self.symbolic.cholesky;
-        let pivots = PermRef::new_checked(&self.pivots.0, &self.pivots.1, n);
-        let factor = IntranodeLbltRef::new(cholesky, &self.values, &self.subdiagonal, pivots);
-        let scale_rows = |x: &mut [f64]| {
-            x.chunks_mut(n).for_each(|column| column.iter_mut().zip(&self.scale).for_each(|(x, s)| *x *= s));
-        };
+        let order = &self.symbolic.tree.permutation;
         x.par_chunks_mut(n * BATCH).for_each(|x| {
-            let columns = x.len() / n;
-            let mut scratch = MemBuffer::new(cholesky.solve_in_place_scratch::<f64>(columns, PARALLELISM));
-            scale_rows(x);
-            factor.solve_in_place_with_conj(
-                Conj::No,
-                MatMut::from_column_major_slice_mut(x, n, columns),
-                PARALLELISM,
-                MemStack::new(&mut scratch),
-            );
-            scale_rows(x);
+            let mut permuted = vec![0.0; x.len()];
+            for (x, permuted) in x.chunks(n).zip(permuted.chunks_mut(n)) {
+                permuted.iter_mut().zip(order).for_each(|(y, &i)| *y = self.scale[i] * x[i]);
+            }
+            solve::solve(&self.symbolic.tree, &self.panels, &mut permuted, x.len() / n);
+            for (x, permuted) in x.chunks_mut(n).zip(permuted.chunks(n)) {
+                permuted.iter().zip(order).for_each(|(y, &i)| x[i] = self.scale[i] * y);
+            }
         });
     }
 
@@ -298,16 +272,12 @@ impl Factor {
     /// Signs of the blocks of B.
     fn count_signs(&self) -> Result<Inertia> {
         let mut inertia = Inertia::default();
-        let SymbolicCholeskyRaw::Supernodal(structure) = self.symbolic.cholesky.raw() else {
-            return Ok(inertia); // only the empty matrix has no supernodes
-        };
-        let pivots = PermRef::new_checked(&self.pivots.0, &self.pivots.1, self.scale.len());
-        let factor = SupernodalIntranodeLbltRef::new(structure, &self.values, &self.subdiagonal, pivots);
-        for (supernode, &first) in structure.supernode_begin()[..structure.n_supernodes()].iter().enumerate() {
-            let block = factor.supernode(supernode).val();
+        let tree = &self.symbolic.tree;
+        for (front, panel) in tree.fronts.iter().zip(&self.panels) {
+            let (block, _) = panel.blocks(front);
             let mut j = 0;
-            while j < block.ncols() {
-                let (d, below) = (block[(j, j)], self.subdiagonal[first + j]);
+            while j < front.width() {
+                let (d, below) = (block[(j, j)], panel.subdiagonal[j]);
                 // eigenvalues of a block of order 2 from its mean and its radius
                 let order = if below == 0.0 { 1 } else { 2 };
                 let (mean, radius) = match order {
@@ -316,7 +286,10 @@ impl Factor {
                 };
                 for eigenvalue in [mean + radius, mean - radius].into_iter().take(order) {
                     if !eigenvalue.is_finite() || eigenvalue == 0.0 {
-                        return Err(Error::Singular { unknown: self.unknown_of_pivot(first + j) });
+                        let start = front.pivot_blocks.iter().map(|block| block.start).rfind(|&start| start <= j);
+                        let first = front.pivots.start + start.unwrap_or(0);
+                        let unknown = tree.permutation[first + panel.exchanges[j]];
+                        return Err(Error::Singular { unknown });
                     }
                     match eigenvalue {
                         value if value.abs() <= ZERO_PIVOT => inertia.zero += 1,
@@ -329,50 +302,33 @@ impl Factor {
         }
         Ok(inertia)
     }
-
-    /// The unknown eliminated by the pivot at `place`.
-    fn unknown_of_pivot(&self, place: usize) -> usize {
-        let exchanged = self.pivots.0[place];
-        self.symbolic.cholesky.perm().map_or(exchanged, |order| order.arrays().0[exchanged])
-    }
 }
 
-/// s_i such that the largest |s_i a_ij s_j| of every row comes close to one (Ruiz 2001), rounded to powers of two.
+/// Factors the subtree that ends with front `root` and returns its contribution; `None` if there is no memory.
 ///
-/// ```text
-/// s_i <- s_i / sqrt(max_j |s_i a_ij s_j|), repeated
-/// ```
-fn equilibrate(a: &SymmetricMatrix, scale: &mut [f64]) {
-    let (col_ptr, row_idx) = (a.pattern.col_ptr(), a.pattern.row_idx());
-    let mut largest = vec![0.0_f64; scale.len()];
-    scale.fill(1.0);
-    for _ in 0..EQUILIBRATION_PASSES {
-        largest.fill(0.0);
-        for j in 0..scale.len() {
-            let entries = col_ptr[j]..col_ptr[j + 1];
-            let mut largest_in_column = 0.0_f64;
-            for (&i, &value) in row_idx[entries.clone()].iter().zip(&a.values[entries]) {
-                let size = (scale[i] * value * scale[j]).abs();
-                largest[i] = largest[i].max(size);
-                largest_in_column = largest_in_column.max(size);
-            }
-            largest[j] = largest[j].max(largest_in_column);
-        }
-        for (s, &size) in scale.iter_mut().zip(&largest) {
-            if size > 0.0 && size.is_finite() {
-                *s /= size.sqrt();
-            }
-        }
+/// Below `root`, the first front with two or more heavy children lets the threads of the pool share these; all fronts
+/// that remain come after them and are factored one after the other. `panels` are those of the subtree.
+fn factor_subtree(source: &Source<'_>, tree: &Tree, root: usize, panels: &mut [Panel]) -> Option<Contribution> {
+    let mut branch = root;
+    while tree.fronts[branch].heavy_children == 1 {
+        branch = tree.fronts[branch].children[0];
     }
-    scale.iter_mut().for_each(|s| *s = s.log2().round().exp2());
-}
-
-/// out = S A S.
-fn scale_symmetrically(a: &SymmetricMatrix, scale: &[f64], out: &mut [f64]) {
-    let (col_ptr, row_idx) = (a.pattern.col_ptr(), a.pattern.row_idx());
-    for (j, s) in scale.iter().enumerate() {
-        for entry in col_ptr[j]..col_ptr[j + 1] {
-            out[entry] = scale[row_idx[entry]] * a.values[entry] * s;
-        }
+    let mut rest = panels;
+    let mut next = tree.fronts[root].first;
+    let mut heavy = Vec::new();
+    for &child in tree.fronts[branch].children.iter().take(tree.fronts[branch].heavy_children) {
+        let (panels, others) = rest.split_at_mut(child + 1 - next);
+        heavy.push((child, panels));
+        (rest, next) = (others, child + 1);
     }
+    let heavy: Vec<_> =
+        heavy.into_par_iter().map(|(child, panels)| factor_subtree(source, tree, child, panels)).collect();
+    let mut waiting = heavy.into_iter().collect::<Option<Vec<_>>>()?;
+    for (f, panel) in (next..=root).zip(rest) {
+        let front = &tree.fronts[f];
+        let contributions = waiting.split_off(waiting.len() - front.children.len());
+        let children = front.children.iter().map(|&child| &tree.fronts[child]).zip(contributions).collect();
+        waiting.push(source.factor(front, panel, children)?);
+    }
+    waiting.pop()
 }

@@ -12,7 +12,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use faer::sparse::{SymbolicSparseColMat, SymbolicSparseColMatRef};
+use faer::sparse::SymbolicSparseColMat;
 use rayon::prelude::*;
 
 /// Pieces into which a product is cut. Fixed, so that the order of the sums does not depend on the threads.
@@ -141,13 +141,8 @@ impl BlockPattern {
         Some(self.offsets[self.neighbour_start[g] + place])
     }
 
-    /// The pattern as faer reads it.
-    pub(crate) fn as_faer(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        self.columns.as_ref()
-    }
-
     /// Cuts the groups into at most [`PARTS`] ranges of about equal numbers of entries.
-    fn parts(&self) -> Vec<Range<usize>> {
+    pub(super) fn parts(&self) -> Vec<Range<usize>> {
         let entries_before = |g: usize| self.col_ptr()[self.group_start[g]];
         let mut parts = Vec::with_capacity(PARTS);
         let mut first = 0;
@@ -166,7 +161,7 @@ impl BlockPattern {
     }
 
     /// Rows below group `g` that its columns hold, as the fewest contiguous ranges.
-    fn row_runs(&self, g: usize, runs: &mut Vec<Range<usize>>) {
+    pub(super) fn row_runs(&self, g: usize, runs: &mut Vec<Range<usize>>) {
         runs.clear();
         for &h in self.neighbours_above(g) {
             let rows = self.unknowns(h);
