@@ -119,11 +119,11 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
     let mut workspace = Workspace::default();
     let force = median(9, || drop(model.evaluate(&found.state, Want::Force, None, &mut workspace)));
     let stiffness = median(9, || drop(model.evaluate(&found.state, Want::Stiffness, None, &mut workspace)));
-    let mut matrix = model.matrix();
-    let assemble = median(9, || model.assemble(&workspace, &mut matrix));
+    let mut tangent = model.tangent();
+    let assemble = median(9, || model.assemble(&workspace, &mut tangent));
     let mut factor = Factor::new(model.symbolic().clone())?;
     let mut failed = None;
-    let factorise = median(5, || failed = factor.refactor(&matrix).err());
+    let factorise = median(5, || failed = factor.refactor(&tangent.matrix).err());
     if let Some(error) = failed {
         return Err(error.into());
     }
@@ -131,7 +131,7 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
     let solve = |columns: usize, factor: &mut Factor| {
         median(5, || {
             let mut rhs: Vec<f64> = (0..n * columns).map(|k| ((k * 7919 % 1000) as f64) / 1000.0 - 0.5).collect();
-            drop(factor.solve(&matrix, &mut rhs, columns, 1e-12));
+            drop(factor.solve(&tangent.matrix, &mut rhs, columns, 1e-12));
         })
     };
     let (one, thirty) = (solve(1, &mut factor), solve(30, &mut factor));

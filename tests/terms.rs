@@ -11,12 +11,14 @@ use risorius::math::tensor::{Matrix, Vector, apply, normalised};
 use risorius::mesh::block::block;
 use risorius::mesh::element::{Element, TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
+use risorius::mesh::join::join;
 use risorius::mesh::location::Locator;
 use risorius::mesh::map::{ElementMap, Term as MapTerm};
 use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
 use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use risorius::term::contact::mutual::{Between, Manner, Mutual};
 use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use risorius::term::contact::{Contact, Interface};
 use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
@@ -88,6 +90,19 @@ fn cases() -> Vec<(String, Model)> {
             Box::new(Contact::new("contact", interface, mesh, faces, 3))
         });
     }
+    for (name, allows, law, relax) in mutual_contacts() {
+        // a barrier stays before the other body
+        let mesh = facing(if law.range() > 0.0 { 6.0 } else { 0.0 });
+        let between = Between::Two(mesh.named_faces["lower:xi3=1"].clone(), mesh.named_faces["upper:xi3=0"].clone());
+        let manner = Manner { allows, law, relax, depth: Some(4.0) };
+        let term: Box<dyn Term> = Box::new(Mutual::new("lips", manner, &mesh, between, 3));
+        all.push((name.to_owned(), model(mesh, &pressure::Trilinear, vec![term], Vec::new())));
+    }
+    let mut single = |name: &str, term: &dyn Fn(&Mesh) -> Box<dyn Term>| {
+        let mesh = host();
+        let terms = vec![term(&mesh)];
+        all.push((name.to_owned(), model(mesh, &pressure::Trilinear, terms, Vec::new())));
+    };
     single("gravity", &|mesh| Box::new(gravity(mesh, 1000.0, [0.0, 3.0, -9.81], 4)));
     single("body force", &|mesh| Box::new(body_force(mesh, [0.01, 0.0, -0.02], 4)));
     let at = MaterialPoint { element: 2, xi: [0.3, 1.0, 0.8] };
@@ -105,6 +120,36 @@ fn cases() -> Vec<(String, Model)> {
 
 fn whole_surface(mesh: &Mesh) -> Vec<risorius::mesh::face::Face> {
     mesh.named_faces.values().flatten().copied().collect()
+}
+
+/// Two curved bodies that face each other, of which the upper one is wider.
+fn facing(apart: f64) -> Mesh {
+    let lower = curved_block(&TricubicHermite, [2, 1, 1], 0.03, 23);
+    let mut upper = curved_block(&TricubicHermite, [2, 2, 1], 0.03, 24);
+    for (k, x) in upper.parameters.iter_mut().enumerate() {
+        if k % 8 == 0 {
+            *x = [x[0] - 1.0, x[1] - 4.0, x[2] + 9.9 + apart];
+        }
+    }
+    join(&[("lower", lower), ("upper", upper)])
+}
+
+type MutualCase = (&'static str, Allows, Box<dyn ContactLaw>, bool);
+
+fn mutual_contacts() -> Vec<MutualCase> {
+    let penalty = || Box::new(Penalty { stiffness: 2.0 });
+    let augmented = || Box::new(Augmented { stiffness: 2.0, tolerance: 1e-6 });
+    vec![
+        ("contact of two bodies, penalty", Allows::ClosedOrOpen, penalty(), false),
+        ("contact of two bodies, augmented", Allows::ClosedOrOpen, augmented(), false),
+        ("contact of two bodies, penalty, relaxing", Allows::ClosedOrOpen, penalty(), true),
+        (
+            "contact of two bodies, barrier",
+            Allows::ClosedOrOpen,
+            Box::new(Barrier { stiffness: 2.0, range: 9.0 }),
+            false,
+        ),
+    ]
 }
 
 type MakeSurface = fn(&Mesh) -> Box<dyn RigidSurface>;
@@ -179,10 +224,10 @@ fn moved(model: &Model, state: &State, direction: &[f64], by: f64) -> State {
 fn tangent_times(model: &Model, state: &State, v: &[f64]) -> Vec<f64> {
     let mut workspace = Workspace::default();
     model.evaluate(state, Want::Stiffness, None, &mut workspace);
-    let mut matrix = model.matrix();
-    model.assemble(&workspace, &mut matrix);
+    let mut tangent = model.tangent();
+    model.assemble(&workspace, &mut tangent);
     let mut product = vec![0.0; v.len()];
-    matrix.multiply(v, &mut product);
+    tangent.matrix.multiply(v, &mut product);
     product
 }
 
@@ -543,15 +588,15 @@ fn threads_change_no_bit() {
             let state = random_state(&model, 46);
             let mut workspace = Workspace::default();
             let found = model.evaluate(&state, Want::Stiffness, None, &mut workspace);
-            let mut matrix = model.matrix();
-            model.assemble(&workspace, &mut matrix);
+            let mut tangent = model.tangent();
+            model.assemble(&workspace, &mut tangent);
             let drive = Drive { controls: vec![0.02], load: 1.0 };
             let mut solver = Solver::new(&model, Settings::default()).expect("memory");
             let solved = solver.equilibrium(&model.rest(), &drive).unwrap_or_else(|f| panic!("{}", f.error));
             let mut numbers = found.energies;
             numbers.extend(found.residual);
             numbers.extend(found.force.as_flattened());
-            numbers.extend(&matrix.values);
+            numbers.extend(&tangent.matrix.values);
             numbers.extend(solved.state.u.as_flattened());
             numbers.extend(solved.state.p);
             numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()

@@ -2,11 +2,11 @@
 
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
-use crate::math::factor::Factor;
-use crate::math::sparse::SymmetricMatrix;
-use crate::model::{Evaluation, Model, State, Workspace, WorstPoint};
+use crate::math::factor::{self, Factor};
+use crate::model::{Evaluation, Model, State, Tangent, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Equations};
 use crate::term::Want;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A residual below this part of mu V^(2/3) is rounding.
@@ -27,9 +27,11 @@ pub(super) struct Balance<'m> {
     pub model: &'m Model,
     pub tolerance: f64,
     workspace: Workspace,
-    matrix: SymmetricMatrix,
+    tangent: Tangent,
     factor: Factor,
     factored: bool,
+    /// What factors with other patterns have done.
+    earlier: factor::Work,
     target: Drive,
     /// Prescribed displacements at the target: (parameter, component, mm).
     prescribed: Vec<(usize, usize, f64)>,
@@ -56,9 +58,10 @@ impl<'m> Balance<'m> {
             model,
             tolerance,
             workspace: Workspace::default(),
-            matrix: model.matrix(),
+            tangent: model.tangent(),
             factor: Factor::new(model.symbolic().clone())?,
             factored: false,
+            earlier: factor::Work::default(),
             target: Drive { controls: vec![0.0; model.controls().len()], load: 0.0 },
             prescribed: Vec::new(),
             residual: Vec::new(),
@@ -81,7 +84,9 @@ impl<'m> Balance<'m> {
     }
 
     pub fn work(&self) -> Work {
-        Work { linear: self.factor.work(), ..self.work.clone() }
+        let mut linear = self.earlier;
+        linear += self.factor.work();
+        Work { linear, ..self.work.clone() }
     }
 
     pub fn count_cut(&mut self) {
@@ -163,16 +168,16 @@ impl<'m> Balance<'m> {
     /// K x = b with the tangent that is assembled; the last factor is kept where it still serves.
     fn solve_assembled(&mut self, rhs: &mut [f64], columns: usize) -> Result<()> {
         let original = rhs.to_vec();
-        if self.factored {
-            let quality = self.factor.solve(&self.matrix, rhs, columns, TANGENT_TOLERANCE)?;
+        let same = Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern());
+        if self.factored && same {
+            let quality = self.factor.solve(&self.tangent.matrix, rhs, columns, TANGENT_TOLERANCE)?;
             if quality.residual <= TANGENT_REQUIRED && quality.sweeps <= STALE_SWEEPS {
                 return Ok(());
             }
             rhs.copy_from_slice(&original);
         }
-        self.factor.refactor(&self.matrix)?;
-        self.factored = true;
-        let quality = self.factor.solve(&self.matrix, rhs, columns, TANGENT_TOLERANCE)?;
+        self.refactor()?;
+        let quality = self.factor.solve(&self.tangent.matrix, rhs, columns, TANGENT_TOLERANCE)?;
         if quality.residual <= TANGENT_REQUIRED {
             Ok(())
         } else {
@@ -199,8 +204,21 @@ impl<'m> Balance<'m> {
 
     fn assemble(&mut self) {
         let start = Instant::now();
-        self.model.assemble(&self.workspace, &mut self.matrix);
+        self.model.assemble(&self.workspace, &mut self.tangent);
         self.work.assembly_seconds += seconds_since(start);
+    }
+
+    fn refactor(&mut self) -> Result<()> {
+        self.factored = false;
+        if !Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern()) {
+            let mut work = self.factor.work();
+            work += self.earlier;
+            self.earlier = work;
+            self.factor = Factor::new(self.model.symbolic_of(&self.tangent)?)?;
+        }
+        self.factor.refactor(&self.tangent.matrix)?;
+        self.factored = true;
+        Ok(())
     }
 
     /// Prescribed motion that a state still lacks, per parameter; `None` when nothing is outstanding.
@@ -257,9 +275,7 @@ impl Equations for Balance<'_> {
         self.lifted = gap.as_ref().map(|_| evaluation.lifted);
         self.lifted_gap = gap.clone();
         self.gap = gap;
-        self.factored = false;
-        self.factor.refactor(&self.matrix)?;
-        self.factored = true;
+        self.refactor()?;
         self.work.iterations += 1;
         self.correction()
     }
@@ -271,7 +287,7 @@ impl Equations for Balance<'_> {
             let part = remaining(gap, first);
             unknowns.iter_mut().zip(lifted).for_each(|(d, k)| *d -= part * k);
         }
-        self.factor.solve(&self.matrix, &mut unknowns, 1, STEP_TOLERANCE)?;
+        self.factor.solve(&self.tangent.matrix, &mut unknowns, 1, STEP_TOLERANCE)?;
         Ok(Direction { unknowns, gap: self.gap.clone() })
     }
 

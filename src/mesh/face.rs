@@ -1,7 +1,7 @@
 //! Faces of hexahedra: which side of which element, and how to walk on it.
 
 use super::Mesh;
-use super::element::ends;
+use super::element::{Element, ends};
 use crate::math::tensor::{Matrix, Vector, cross};
 use std::collections::HashMap;
 use std::fmt;
@@ -57,6 +57,14 @@ impl Side {
             *slot = k;
         }
         found
+    }
+
+    /// The local functions that are not zero on this side, ascending: those at its nodes without a derivative through it.
+    pub fn functions(self, element: &dyn Element) -> Vec<usize> {
+        let per_node = element.parameters_per_node();
+        let on_side =
+            |a: &usize| ends(a / per_node)[self.direction] == self.end && (a % per_node) >> self.direction & 1 == 0;
+        (0..element.functions()).filter(on_side).collect()
     }
 }
 

@@ -6,6 +6,7 @@ pub mod element;
 pub mod exf;
 pub mod face;
 pub mod fibre_angles;
+pub mod join;
 pub mod location;
 pub mod map;
 pub mod surface;

@@ -2,13 +2,17 @@
 //! threads.
 //!
 //! Two passes. The first fills one small system per element, independently. The second fills the columns of the matrix
-//! group by group: every group adds its elements in ascending order, whoever does it.
+//! group by group: every group adds its elements in ascending order and then the pairs of faces that meet, whoever does
+//! it.
 
-use super::numbering::Numbering;
+use super::numbering::{Numbering, Run};
 use super::state::State;
 use crate::material::PAIRS;
 use crate::math::sparse::{BlockPattern, SymmetricMatrix};
+use crate::math::tensor::Vector;
 use crate::mesh::Mesh;
+use crate::mesh::face::Face;
+use crate::term::coupling::{BodyState, FacePair};
 use crate::term::pressure::PressureSpace;
 use crate::term::{DetF, ElementState, ElementSystem, MAX_PRESSURES, Term, Want};
 use rayon::prelude::*;
@@ -28,8 +32,6 @@ pub(super) struct Plan {
     pressures: Vec<Vec<usize>>,
     /// Elements that touch each group, ascending, with the group's position in the element's clique.
     elements_of_group: Vec<Vec<(usize, usize)>>,
-    /// Groups of each batch of columns.
-    batches: Vec<std::ops::Range<usize>>,
 }
 
 /// One element's share of an evaluation.
@@ -51,6 +53,17 @@ struct ElementWork {
 #[derive(Default)]
 pub struct Workspace {
     elements: Vec<ElementWork>,
+    /// The pairs of faces that met at the last evaluation, of every coupling in turn.
+    pairs: Vec<FacePair>,
+}
+
+/// A tangent. Its pattern depends on the pairs of faces that meet.
+#[derive(Debug, Clone)]
+pub struct Tangent {
+    /// The matrix, by unknowns.
+    pub matrix: SymmetricMatrix,
+    /// The pairs of faces that its pattern has room for, ascending.
+    pub(super) pairs: Vec<[Face; 2]>,
 }
 
 /// det F over the whole body.
@@ -99,7 +112,6 @@ impl Plan {
         space: &dyn PressureSpace,
         terms: &[Box<dyn Term>],
         numbering: &Numbering,
-        pattern: &BlockPattern,
     ) -> Plan {
         let active =
             (0..mesh.elements()).map(|e| (0..terms.len()).filter(|t| terms[*t].acts_on(e)).collect()).collect();
@@ -110,24 +122,27 @@ impl Plan {
                 elements_of_group[*group].push((element, position));
             }
         }
-        // batches of about equal numbers of entries
-        let total = pattern.nnz().max(1);
-        let mut batches = Vec::new();
-        let mut first = 0;
-        for group in 0..groups {
-            let done = pattern.col_ptr()[numbering.group_start[group + 1]];
-            if done * BATCHES >= total * (batches.len() + 1) || group + 1 == groups {
-                batches.push(first..group + 1);
-                first = group + 1;
-            }
-        }
         Plan {
             active,
             pressures: (0..mesh.elements()).map(|e| space.parameters(mesh, e)).collect(),
             elements_of_group,
-            batches,
         }
     }
+}
+
+/// Ranges of groups with about equal numbers of entries.
+fn batches(pattern: &BlockPattern, group_start: &[usize]) -> Vec<std::ops::Range<usize>> {
+    let (total, groups) = (pattern.nnz().max(1), group_start.len() - 1);
+    let mut batches = Vec::new();
+    let mut first = 0;
+    for group in 0..groups {
+        let done = pattern.col_ptr()[group_start[group + 1]];
+        if done * BATCHES >= total * (batches.len() + 1) || group + 1 == groups {
+            batches.push(first..group + 1);
+            first = group + 1;
+        }
+    }
+    batches
 }
 
 /// The local view of a state in one element: current geometry, displacement, pressure.
@@ -162,7 +177,82 @@ impl Parts<'_> {
         workspace.elements.par_iter_mut().enumerate().for_each(|(element, work)| {
             self.evaluate_element(state, element, want, gap, work);
         });
-        self.reduce(&workspace.elements)
+        let mut evaluation = self.reduce(&workspace.elements);
+        workspace.pairs.clear();
+        self.couple(state, want, gap, &mut evaluation, &mut workspace.pairs);
+        evaluation
+    }
+
+    /// Adds what faces exert on each other.
+    fn couple(
+        &self,
+        state: &State,
+        want: Want,
+        gap: Option<&[[f64; 3]]>,
+        evaluation: &mut Evaluation,
+        pairs: &mut Vec<FacePair>,
+    ) {
+        let couplings = self.terms.iter().enumerate().filter_map(|(index, term)| Some((index, term.as_coupling()?)));
+        let mut x: Option<Vec<Vector>> = None;
+        for (term, coupling) in couplings {
+            let start = Instant::now();
+            let x = x.get_or_insert_with(|| current(self.mesh, state));
+            let body = BodyState { mesh: self.mesh, x, load: state.load, multipliers: &state.multipliers[term] };
+            let coupled = coupling.add(&body, want);
+            evaluation.seconds[term] += start.elapsed().as_secs_f64();
+            evaluation.energies[term] += coupled.energy;
+            let mut square = evaluation.magnitude * evaluation.magnitude;
+            for pair in &coupled.pairs {
+                square += pair.force.iter().map(|f| f * f).sum::<f64>();
+                self.scatter_pair(pair.faces, &pair.force, |parameter, component, value| {
+                    evaluation.force[parameter][component] += value;
+                    if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                        evaluation.residual[unknown] += value;
+                    }
+                });
+                if let Some(gap) = gap.filter(|_| want == Want::Stiffness) {
+                    let moved = pair.times(&self.gather_pair(pair.faces, gap));
+                    self.scatter_pair(pair.faces, &moved, |parameter, component, value| {
+                        if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                            evaluation.lifted[unknown] += value;
+                        }
+                    });
+                }
+            }
+            evaluation.magnitude = square.sqrt();
+            // a state in which bodies have passed through each other has no residual
+            if !coupled.energy.is_finite() {
+                evaluation.residual.iter_mut().for_each(|r| *r = f64::NAN);
+            }
+            pairs.extend(coupled.pairs);
+        }
+    }
+
+    /// Calls `add` with the share of every global parameter in the local entries of a pair of faces.
+    pub(super) fn scatter_pair(&self, faces: [Face; 2], local: &[f64], mut add: impl FnMut(usize, usize, f64)) {
+        let mut first = 0;
+        for face in faces {
+            let functions = face.side.functions(self.mesh.element);
+            for (k, &a) in functions.iter().enumerate() {
+                for term in self.mesh.map.terms(face.element, a) {
+                    for i in 0..3 {
+                        add(term.global as usize, i, term.scale * local[first + i * functions.len() + k]);
+                    }
+                }
+            }
+            first += 3 * functions.len();
+        }
+    }
+
+    /// The local entries of a pair of faces in a field of global parameters.
+    fn gather_pair(&self, faces: [Face; 2], global: &[[f64; 3]]) -> Vec<f64> {
+        let mut all = Vec::new();
+        for face in faces {
+            let local = self.mesh.local_of(face.element, global);
+            let functions = face.side.functions(self.mesh.element);
+            all.extend(local.iter().flat_map(|component| functions.iter().map(|a| component[*a])));
+        }
+        all
     }
 
     fn evaluate_element(
@@ -255,13 +345,19 @@ impl Parts<'_> {
         Evaluation { energies, seconds, det_f, force, residual, magnitude: magnitude.sqrt(), lifted }
     }
 
-    /// Gathers the element stiffnesses of the last evaluation that wanted them into the matrix.
+    /// Gathers the stiffnesses of the last evaluation that wanted them into the matrix, whose pattern has room for them.
     pub(super) fn assemble(&self, workspace: &Workspace, matrix: &mut SymmetricMatrix) {
         let pattern = matrix.pattern.clone();
+        let batches = batches(&pattern, &self.numbering.group_start);
+        let pairs: Vec<_> = workspace.pairs.iter().map(|p| self.numbering.of_faces(self.mesh, p.faces)).collect();
+        let mut pairs_of_group = vec![Vec::new(); self.numbering.group_start.len() - 1];
+        for (index, (_, clique)) in pairs.iter().enumerate() {
+            clique.iter().enumerate().for_each(|(position, group)| pairs_of_group[*group].push((index, position)));
+        }
         let mut rest = matrix.values.as_mut_slice();
-        let mut pieces = Vec::with_capacity(self.plan.batches.len());
+        let mut pieces = Vec::with_capacity(batches.len());
         let mut taken = 0;
-        for batch in &self.plan.batches {
+        for batch in &batches {
             let end = pattern.col_ptr()[self.numbering.group_start[batch.end]];
             let (piece, remainder) = rest.split_at_mut(end - taken);
             pieces.push((batch.clone(), taken, piece));
@@ -272,24 +368,35 @@ impl Parts<'_> {
             for group in groups {
                 for &(element, position) in &self.plan.elements_of_group[group] {
                     let system = &workspace.elements[element].system;
-                    self.add_columns(element, position, system, &pattern, start, values);
+                    let (runs, clique) = (&self.numbering.runs[element], &self.numbering.cliques[element]);
+                    let row = |local: usize, out: &mut [f64]| system.row(local, out);
+                    self.add_columns((runs, clique), position, LOCAL, row, &pattern, start, values);
+                }
+                for &(index, position) in &pairs_of_group[group] {
+                    let (runs, clique) = &pairs[index];
+                    let FacePair { force, stiffness, .. } = &workspace.pairs[index];
+                    let n = force.len();
+                    let row =
+                        |local: usize, out: &mut [f64]| out.copy_from_slice(&stiffness[n * local..n * (local + 1)]);
+                    self.add_columns((runs, clique), position, n, row, &pattern, start, values);
                 }
             }
         });
     }
 
-    /// Adds the columns of one element that belong to one group; `start` is the index of `values[0]` in the matrix.
+    /// Adds the columns of one small system that belong to one of its groups; `row` gives a row of its `size` entries, and
+    /// `start` is the index of `values[0]` in the matrix.
+    #[allow(clippy::too_many_arguments)] // the inside of one loop
     fn add_columns(
         &self,
-        element: usize,
+        (runs, clique): (&[Run], &[usize]),
         position: usize,
-        system: &ElementSystem,
+        size: usize,
+        give_row: impl Fn(usize, &mut [f64]),
         pattern: &BlockPattern,
         start: usize,
         values: &mut [f64],
     ) {
-        let clique = &self.numbering.cliques[element];
-        let runs = &self.numbering.runs[element];
         let group = clique[position];
         let group_end = self.numbering.group_start[group + 1];
         // where the rows of each later group of the clique stand below the group's own rows
@@ -298,10 +405,11 @@ impl Parts<'_> {
             .map(|other| if *other > group { pattern.offset(group, *other).unwrap_or(0) } else { 0 })
             .collect();
         let mut row = [0.0; LOCAL];
+        let row = &mut row[..size];
         for column_run in runs.iter().filter(|r| r.group == position) {
             for step in 0..column_run.length {
                 let column = column_run.unknown + step;
-                system.row(column_run.local + step, &mut row);
+                give_row(column_run.local + step, row);
                 let base = pattern.col_ptr()[column] - start;
                 for run in runs {
                     if run.group < position || run.unknown + run.length <= column {
@@ -329,7 +437,7 @@ impl Parts<'_> {
 
 impl ElementSystem {
     /// One row (or column) of the symmetric element matrix, by local entry.
-    fn row(&self, local: usize, out: &mut [f64; LOCAL]) {
+    fn row(&self, local: usize, out: &mut [f64]) {
         if local < 192 {
             let (i, a) = (local / 64, local % 64);
             for k in 0..3 {
@@ -371,4 +479,28 @@ fn pair(i: usize, k: usize) -> usize {
     const INDEX: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
     debug_assert!(PAIRS[INDEX[i][k]] == (i.min(k), i.max(k)));
     INDEX[i][k]
+}
+
+impl FacePair {
+    /// The stiffness times a displacement.
+    fn times(&self, v: &[f64]) -> Vec<f64> {
+        let row = |row: &[f64]| row.iter().zip(v).map(|(k, v)| k * v).sum();
+        self.stiffness.chunks_exact(self.force.len()).map(row).collect()
+    }
+}
+
+/// Global parameters x = X + u.
+pub(super) fn current(mesh: &Mesh, state: &State) -> Vec<Vector> {
+    let add = |(x, u): (&Vector, &Vector)| std::array::from_fn(|i| x[i] + u[i]);
+    mesh.parameters.iter().zip(&state.u).map(add).collect()
+}
+
+impl Workspace {
+    /// The pairs of faces that met at the last evaluation, ascending.
+    pub(super) fn met(&self) -> Vec<[Face; 2]> {
+        let mut all: Vec<_> = self.pairs.iter().map(|pair| pair.faces).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
 }

@@ -21,6 +21,7 @@ impl Model {
     pub fn renew_multipliers(&self, state: &State) -> Option<Renewal> {
         let mut worst: Option<Renewal> = None;
         let mut multipliers = state.multipliers.clone();
+        let mut found = Vec::new();
         for (term, constraint) in self.terms().iter().enumerate().filter_map(|(k, t)| Some((k, t.as_constraint()?))) {
             let mut gap: f64 = 0.0;
             for element in self.elements_of(term) {
@@ -28,7 +29,13 @@ impl Model {
                     gap = gap.max(constraint.renew(at, &mut multipliers[term]));
                 });
             }
-            let tolerance = constraint.tolerance();
+            found.push((term, gap, constraint.tolerance()));
+        }
+        for (term, coupling) in self.couplings().filter(|(_, c)| c.multipliers() > 0) {
+            let gap = self.with_body(state, term, |body| coupling.renew(body, &mut multipliers[term]));
+            found.push((term, gap, coupling.tolerance()));
+        }
+        for (term, gap, tolerance) in found {
             if worst.as_ref().is_none_or(|w| gap * w.tolerance > w.gap * tolerance) {
                 worst = Some(Renewal { multipliers: Vec::new(), term, gap, tolerance });
             }
@@ -46,6 +53,9 @@ impl Model {
                 self.with_own(state, term, element, |at| constraint.constraint_rate(at, &local, &mut z[term]));
             }
         }
+        for (term, coupling) in self.couplings().filter(|(_, c)| c.multipliers() > 0) {
+            self.with_body(state, term, |body| coupling.constraint_rate(body, &du, &mut z[term]));
+        }
         z
     }
 
@@ -58,6 +68,10 @@ impl Model {
                 self.with_own(state, term, element, |at| constraint.add_constraint_force(at, &z[term], &mut force));
                 self.scatter(element, &force, &mut total);
             }
+        }
+        for (term, coupling) in self.couplings().filter(|(_, c)| c.multipliers() > 0) {
+            let pairs = self.with_body(state, term, |body| coupling.constraint_force(body, &z[term]));
+            self.scatter_pairs(&pairs, &mut total);
         }
         total
     }

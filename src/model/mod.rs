@@ -8,7 +8,7 @@ mod state;
 pub mod supports;
 mod tissue;
 
-pub use assembly::{Evaluation, Workspace, WorstPoint};
+pub use assembly::{Evaluation, Tangent, Workspace, WorstPoint};
 pub use constraints::Renewal;
 pub use numbering::Numbering;
 pub use state::State;
@@ -18,7 +18,10 @@ use crate::math::factor::Symbolic;
 use crate::math::ordering::Ordering;
 use crate::math::sparse::{BlockPattern, SymmetricMatrix};
 use crate::mesh::Mesh;
-use crate::term::contact::Contact;
+use crate::mesh::face::Face;
+use crate::term::contact::ContactPoint;
+use crate::term::contact::law::Allows;
+use crate::term::coupling::{BodyState, Coupling, FacePair};
 use crate::term::muscle::Muscle;
 use crate::term::pressure::PressureSpace;
 use crate::term::{ElementState, Term, Want};
@@ -65,8 +68,8 @@ pub struct Model {
     pattern: Arc<BlockPattern>,
     symbolic: Arc<Symbolic>,
     plan: Plan,
-    /// Work that building took.
-    ordering_flops: f64,
+    /// The order of elimination, chosen with the faces that are near each other at rest.
+    ordering: Ordering,
 }
 
 impl Model {
@@ -77,12 +80,13 @@ impl Model {
     pub fn new(ingredients: Ingredients) -> Result<Model> {
         let Ingredients { mesh, space, terms, supports, .. } = &ingredients;
         let numbering = Numbering::new(mesh, *space, supports);
-        let pattern =
-            Arc::new(BlockPattern::new(&numbering.group_start, numbering.cliques.iter().map(Vec::as_slice)));
-        let ordering = Ordering::new(&pattern, &numbering.pressure_groups());
+        let near: Vec<_> =
+            terms.iter().filter_map(|t| t.as_coupling()).flat_map(|c| c.neighbours().iter().copied()).collect();
+        let ordering = Ordering::new(&pattern(&numbering, mesh, &near), &numbering.pressure_groups());
+        let pattern = Arc::new(pattern(&numbering, mesh, &[]));
         let symbolic = Symbolic::new(pattern.clone(), &ordering)?;
-        let plan = Plan::new(mesh, *space, terms, &numbering, &pattern);
-        Ok(Model { numbering, pattern, symbolic, plan, ordering_flops: ordering.flops, ingredients })
+        let plan = Plan::new(mesh, *space, terms, &numbering);
+        Ok(Model { numbering, pattern, symbolic, plan, ordering, ingredients })
     }
 
     /// The host.
@@ -105,9 +109,28 @@ impl Model {
         self.terms().iter().find(|t| t.as_muscle().is_some() && t.name() == name).map_or(&[], |t| t.controls())
     }
 
-    /// The contacts among the terms, each with its index in [`Model::terms`].
-    pub fn contacts(&self) -> impl Iterator<Item = (usize, &Contact)> {
-        self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_contact()?)))
+    /// What the slidings and contacts among the terms allow, each with its index in [`Model::terms`].
+    pub fn contacts(&self) -> impl Iterator<Item = (usize, Allows)> {
+        let allows = |term: &dyn Term| match (term.as_contact(), term.as_coupling()) {
+            (Some(contact), _) => Some(contact.allows()),
+            (_, Some(coupling)) => Some(coupling.allows()),
+            _ => None,
+        };
+        self.terms().iter().enumerate().filter_map(move |(index, term)| Some((index, allows(term.as_ref())?)))
+    }
+
+    /// All quadrature points of a sliding or contact at a state; none for another term.
+    pub fn contact_points(&self, state: &State, term: usize) -> Vec<ContactPoint> {
+        if let Some(coupling) = self.terms()[term].as_coupling() {
+            return self.with_body(state, term, |body| coupling.contact_points(body));
+        }
+        let mut all = Vec::new();
+        if let Some(contact) = self.terms()[term].as_contact() {
+            for element in contact.elements() {
+                self.with_own(state, term, element, |at| all.extend(contact.points_at(at)));
+            }
+        }
+        all
     }
 
     /// Inputs in their order in [`State::controls`].
@@ -130,19 +153,30 @@ impl Model {
         &self.numbering
     }
 
-    /// The structure of the factorised tangent.
+    /// The structure of the factorised tangent while no faces meet.
     pub fn symbolic(&self) -> &Arc<Symbolic> {
         &self.symbolic
     }
 
-    /// A zero matrix with the pattern of the tangent.
-    pub fn matrix(&self) -> SymmetricMatrix {
-        SymmetricMatrix::zeros(self.pattern.clone())
+    /// A zero tangent, with room for no pair of faces that meet.
+    pub fn tangent(&self) -> Tangent {
+        Tangent { matrix: SymmetricMatrix::zeros(self.pattern.clone()), pairs: Vec::new() }
+    }
+
+    /// The structure of the factor of a tangent.
+    ///
+    /// # Errors
+    /// Where the factor would not fit into memory.
+    pub fn symbolic_of(&self, tangent: &Tangent) -> Result<Arc<Symbolic>> {
+        if Arc::ptr_eq(&tangent.matrix.pattern, &self.pattern) {
+            return Ok(self.symbolic.clone());
+        }
+        Symbolic::new(tangent.matrix.pattern.clone(), &self.ordering)
     }
 
     /// Operations of one factorisation, an addition and a multiplication counted as two.
     pub fn factor_flops(&self) -> f64 {
-        self.ordering_flops
+        self.symbolic.flops()
     }
 
     /// Characteristic element size, mm: the cube root of the mean element volume.
@@ -180,7 +214,12 @@ impl Model {
             multipliers: self
                 .terms()
                 .iter()
-                .map(|t| vec![0.0; t.as_constraint().map_or(0, |c| c.multipliers())])
+                .map(|t| match (t.as_constraint(), t.as_coupling()) {
+                    (Some(constraint), _) => constraint.multipliers(),
+                    (_, Some(coupling)) => coupling.multipliers(),
+                    _ => 0,
+                })
+                .map(|count| vec![0.0; count])
                 .collect(),
         }
     }
@@ -197,9 +236,18 @@ impl Model {
         self.parts().evaluate(state, want, gap, workspace)
     }
 
-    /// The tangent d2Pi/d(unknowns)2 from the last evaluation that wanted it.
-    pub fn assemble(&self, workspace: &Workspace, matrix: &mut SymmetricMatrix) {
-        self.parts().assemble(workspace, matrix);
+    /// The tangent d2Pi/d(unknowns)2 from the last evaluation that wanted it. Where other faces meet than before it takes
+    /// another pattern; the pattern depends on the state alone, not on what came before.
+    pub fn assemble(&self, workspace: &Workspace, tangent: &mut Tangent) {
+        let met = workspace.met();
+        if met != tangent.pairs {
+            let pattern = match met.as_slice() {
+                [] => self.pattern.clone(),
+                met => Arc::new(pattern(&self.numbering, self.mesh(), met)),
+            };
+            *tangent = Tangent { matrix: SymmetricMatrix::zeros(pattern), pairs: met };
+        }
+        self.parts().assemble(workspace, &mut tangent.matrix);
     }
 
     /// dr/d(control) for the unknowns: the force per unit of a control.
@@ -215,7 +263,12 @@ impl Model {
 
     /// dr/d(load) for the unknowns.
     pub fn load_force(&self, state: &State) -> Vec<f64> {
-        self.force_of(state, |_| true, |term, at, force| term.add_load_force(at, force))
+        let mut total = self.force_of(state, |_| true, |term, at, force| term.add_load_force(at, force));
+        for (term, coupling) in self.couplings() {
+            let pairs = self.with_body(state, term, |body| coupling.load_force(body));
+            self.scatter_pairs(&pairs, &mut total);
+        }
+        total
     }
 
     fn force_of(
@@ -241,6 +294,28 @@ impl Model {
         total
     }
 
+    /// The couplings among the terms, each with its index in [`Model::terms`].
+    fn couplings(&self) -> impl Iterator<Item = (usize, &dyn Coupling)> {
+        self.terms().iter().enumerate().filter_map(|(index, term)| Some((index, term.as_coupling()?)))
+    }
+
+    /// Calls `f` with the body as a coupling sees it.
+    fn with_body<R>(&self, state: &State, term: usize, f: impl FnOnce(&BodyState<'_>) -> R) -> R {
+        let (x, multipliers) = (self.current(state), &state.multipliers[term]);
+        f(&BodyState { mesh: self.mesh(), x: &x, load: state.load, multipliers })
+    }
+
+    /// Adds the forces of pairs of faces to those on the unknowns.
+    fn scatter_pairs(&self, pairs: &[FacePair], total: &mut [f64]) {
+        for pair in pairs {
+            self.parts().scatter_pair(pair.faces, &pair.force, |parameter, component, value| {
+                if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                    total[unknown] += value;
+                }
+            });
+        }
+    }
+
     /// Adds the forces on the local parameters of an element to those on the unknowns.
     fn scatter(&self, element: usize, force: &[[f64; 64]; 3], total: &mut [f64]) {
         for run in self.numbering.runs[element].iter().filter(|r| r.local < 192) {
@@ -254,7 +329,7 @@ impl Model {
     /// Quadrature points of each term in one evaluation.
     pub fn points(&self) -> impl Iterator<Item = usize> + '_ {
         let active = |t: &dyn Term| (0..self.mesh().elements()).filter(|e| t.acts_on(*e)).map(|e| t.points(e)).sum();
-        self.terms().iter().map(move |t| active(t.as_ref()))
+        self.terms().iter().map(move |t| t.as_coupling().map_or_else(|| active(t.as_ref()), Coupling::points))
     }
 
     /// Calls `f` with the local view of a state in one element, without the multipliers of any term.
@@ -284,8 +359,7 @@ impl Model {
 
     /// Current parameters x = X + u.
     pub fn current(&self, state: &State) -> Vec<[f64; 3]> {
-        let add = |(x, u): (&[f64; 3], &[f64; 3])| std::array::from_fn(|i| x[i] + u[i]);
-        self.mesh().parameters.iter().zip(&state.u).map(add).collect()
+        assembly::current(self.mesh(), state)
     }
 
     /// The unknowns of a state in the order of the linear system.
@@ -333,4 +407,10 @@ impl Model {
         let Ingredients { mesh, terms, .. } = &self.ingredients;
         Parts { mesh, terms, numbering: &self.numbering, plan: &self.plan }
     }
+}
+
+/// The pattern of the tangent where these pairs of faces meet.
+fn pattern(numbering: &Numbering, mesh: &Mesh, pairs: &[[Face; 2]]) -> BlockPattern {
+    let met: Vec<_> = pairs.iter().map(|faces| numbering.of_faces(mesh, *faces).1).collect();
+    BlockPattern::new(&numbering.group_start, numbering.cliques.iter().chain(&met).map(Vec::as_slice))
 }

@@ -5,6 +5,7 @@
 
 use super::supports::Supports;
 use crate::mesh::Mesh;
+use crate::mesh::face::Face;
 use crate::term::MAX_PRESSURES;
 use crate::term::pressure::{PressurePlace, PressureSpace};
 
@@ -99,7 +100,6 @@ impl Numbering {
     }
 
     fn add_element(&mut self, mesh: &Mesh, space: &dyn PressureSpace, element: usize) {
-        // single entries (local, unknown, scale), then joined
         let mut entries: Vec<(usize, usize, f64)> = Vec::new();
         for a in 0..mesh.element.functions() {
             for term in mesh.map.terms(element, a) {
@@ -115,6 +115,36 @@ impl Numbering {
             debug_assert!(c < MAX_PRESSURES);
             entries.push((192 + c, self.pressure[index] as usize, 1.0));
         }
+        let (runs, clique) = self.join(entries);
+        self.runs.push(runs);
+        self.cliques.push(clique);
+    }
+
+    /// Runs and groups of a system between two faces, whose local entries are those of [`FacePair`].
+    ///
+    /// [`FacePair`]: crate::term::coupling::FacePair
+    pub fn of_faces(&self, mesh: &Mesh, faces: [Face; 2]) -> (Vec<Run>, Vec<usize>) {
+        let mut entries: Vec<(usize, usize, f64)> = Vec::new();
+        let mut first = 0;
+        for face in faces {
+            let functions = face.side.functions(mesh.element);
+            for (k, &a) in functions.iter().enumerate() {
+                for term in mesh.map.terms(face.element, a) {
+                    for component in 0..3 {
+                        let unknown = self.displacement[term.global as usize][component];
+                        if unknown != PRESCRIBED {
+                            entries.push((first + component * functions.len() + k, unknown as usize, term.scale));
+                        }
+                    }
+                }
+            }
+            first += 3 * functions.len();
+        }
+        self.join(entries)
+    }
+
+    /// Joins single entries (local, unknown, scale) to runs; gives the groups they belong to, ascending.
+    fn join(&self, mut entries: Vec<(usize, usize, f64)>) -> (Vec<Run>, Vec<usize>) {
         entries.sort_by_key(|(local, unknown, _)| (*unknown, *local));
         let group_of = |unknown: usize| self.group_start.partition_point(|start| *start <= unknown) - 1;
         let mut clique: Vec<usize> = entries.iter().map(|(_, unknown, _)| group_of(*unknown)).collect();
@@ -134,8 +164,7 @@ impl Numbering {
                 _ => runs.push(Run { local, unknown, length: 1, scale, group }),
             }
         }
-        self.runs.push(runs);
-        self.cliques.push(clique);
+        (runs, clique)
     }
 
     /// The number of unknowns.

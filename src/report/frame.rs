@@ -5,7 +5,6 @@ use crate::math::tensor::{Vector, add_scaled, norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Evaluation, Model, State};
 use crate::term::contact::law::Allows;
-use crate::term::contact::{Contact, ContactPoint};
 
 /// A frame of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,7 +80,7 @@ pub struct MuscleState<'a> {
 pub struct ContactState<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Reference area that is pressed or held, mm2.
+    /// Reference area that is pressed or held, mm2; of two faces that meet, of the first.
     pub area: f64,
     /// Mean pressure over that area, kPa per reference area; negative where the face is held back. 0 without contact.
     pub mean_pressure: f64,
@@ -89,7 +88,7 @@ pub struct ContactState<'a> {
     pub max_pressure: f64,
     /// Largest penetration, of a sliding the largest gap to either side, mm.
     pub penetration: f64,
-    /// Force of the surface on the body, mN.
+    /// Force of the surface on the body, mN; of two faces that meet, of the second on the first.
     pub force: Vector,
 }
 
@@ -132,7 +131,7 @@ pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluatio
 
 /// All slidings and contacts of a model at a state, in the order of its terms.
 pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'m>> {
-    let contact_state = |(term, contact): (usize, &'m Contact)| {
+    let contact_state = |(term, allows): (usize, Allows)| {
         let mut sum = ContactState {
             name: model.terms()[term].name(),
             area: 0.0,
@@ -141,15 +140,18 @@ pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'
             penetration: 0.0,
             force: [0.0; 3],
         };
-        for point in contact_points(model, state, term, contact) {
+        for point in model.contact_points(state, term) {
+            let gap = point.gap.unwrap_or(0.0);
+            let wrong = if allows == Allows::Closed { gap.abs() } else { -gap };
+            sum.penetration = sum.penetration.max(wrong);
+            if !point.counted {
+                continue;
+            }
             if point.pressure != 0.0 {
                 sum.area += point.area;
             }
             sum.mean_pressure += point.pressure * point.area;
             sum.max_pressure = sum.max_pressure.max(point.pressure);
-            let gap = point.gap.unwrap_or(0.0);
-            let wrong = if contact.allows() == Allows::Closed { gap.abs() } else { -gap };
-            sum.penetration = sum.penetration.max(wrong);
             sum.force = add_scaled(sum.force, point.pressure * point.area, point.normal);
         }
         // per area in contact
@@ -157,13 +159,4 @@ pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'
         sum
     };
     model.contacts().map(contact_state).collect()
-}
-
-/// All quadrature points of one contact at a state.
-pub fn contact_points(model: &Model, state: &State, term: usize, contact: &Contact) -> Vec<ContactPoint> {
-    let mut all = Vec::new();
-    for element in contact.elements() {
-        model.with_own(state, term, element, |at| all.extend(contact.points_at(at)));
-    }
-    all
 }

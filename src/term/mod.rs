@@ -1,10 +1,12 @@
 //! Contributions to the balance r(u, p; a) = 0, one file each. A scene that does not name an effect builds no term for it.
 //!
-//! All terms are sums over the elements of the host: a term adds its energy, its force r = dPi/d(u, p) and its
-//! stiffness K = dr/d(u, p) to the small system of one element, which the model then assembles.
+//! Almost all terms are sums over the elements of the host: a term adds its energy, its force r = dPi/d(u, p) and its
+//! stiffness K = dr/d(u, p) to the small system of one element, which the model then assembles. What acts between
+//! elements is a [`coupling`].
 
 pub mod constraint;
 pub mod contact;
+pub mod coupling;
 pub mod load;
 pub mod muscle;
 pub mod pressure;
@@ -148,6 +150,11 @@ pub trait Term: Send + Sync {
 
     /// The term as a contact, if it is one: its pressure is shown in results.
     fn as_contact(&self) -> Option<&contact::Contact> {
+        None
+    }
+
+    /// The term as a coupling, if it acts between elements and not within them.
+    fn as_coupling(&self) -> Option<&dyn coupling::Coupling> {
         None
     }
 

@@ -28,8 +28,7 @@ pub fn contact(
 
 /// All points of the contacts of a model at an equilibrium.
 pub fn contact_points(model: &Model, found: &Equilibrium) -> Vec<ContactPoint> {
-    let of = |(term, contact)| risorius::report::frame::contact_points(model, &found.state, term, contact);
-    model.contacts().flat_map(of).collect()
+    model.contacts().flat_map(|(term, _)| model.contact_points(&found.state, term)).collect()
 }
 
 pub fn solve_to(model: &Model, tolerance: f64) -> (Equilibrium, usize) {

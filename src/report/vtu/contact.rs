@@ -2,7 +2,6 @@
 
 use super::grid::{Field, Grid};
 use crate::model::{Model, State};
-use crate::report::frame::contact_points;
 use crate::term::contact::ContactPoint;
 
 /// All quadrature points of all slidings and contacts at a state: pressure (kPa per reference area), gap (mm, NaN beyond
@@ -12,8 +11,8 @@ pub fn points(model: &Model, state: &State, time_s: f64) -> Grid {
     let all: Vec<_> = model
         .contacts()
         .enumerate()
-        .flat_map(|(number, (term, contact))| {
-            contact_points(model, state, term, contact).into_iter().map(move |point| (number as i64, point))
+        .flat_map(|(number, (term, _))| {
+            model.contact_points(state, term).into_iter().map(move |point| (number as i64, point))
         })
         .collect();
     let scalars = |f: fn(&ContactPoint) -> f64| all.iter().map(|(_, p)| f(p)).collect();

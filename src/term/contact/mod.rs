@@ -1,4 +1,4 @@
-//! Contact of faces of the host with a rigid surface, without friction.
+//! Contact of faces of the host with a rigid surface, without friction; with each other: [`mutual`].
 //!
 //! Pi = sum over points w psi(g(x)), with the reference area w of a point and the gap g of its current position:
 //!   dPi/du_ia       = sum w psi' n_i N_a
@@ -7,6 +7,8 @@
 //! takes the difference away: g(x) - (1 - load) g(X).
 
 pub mod law;
+pub mod mutual;
+mod patch;
 pub mod surface;
 
 use super::constraint::Constraint;
@@ -69,6 +71,8 @@ pub struct ContactPoint {
     pub pressure: f64,
     /// Reference area, mm2.
     pub area: f64,
+    /// Whether it counts in sums: of two faces that meet, the points of the first do.
+    pub counted: bool,
 }
 
 impl Contact {
@@ -141,6 +145,7 @@ impl Contact {
                 normal: gap.map_or([0.0; 3], |gap| gap.normal),
                 pressure: -response.slope,
                 area: point.weight,
+                counted: true,
             }
         })
     }

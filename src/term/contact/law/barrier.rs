@@ -21,6 +21,10 @@ impl ContactLaw for Barrier {
         self.stiffness
     }
 
+    fn range(&self) -> f64 {
+        self.range
+    }
+
     fn response(&self, gap: f64, _allows: Allows, _multiplier: f64) -> Response {
         let (k, r) = (self.stiffness, self.range);
         if gap >= r {

@@ -47,6 +47,11 @@ pub trait ContactLaw: Send + Sync + std::fmt::Debug {
     /// Its stiffness k, kPa/mm.
     fn stiffness(&self) -> f64;
 
+    /// The gap (mm) at which contact begins before anything touches.
+    fn range(&self) -> f64 {
+        0.0
+    }
+
     /// The gap (mm) to which multipliers close a gap that should be zero; `None` for a law that has no multipliers.
     fn gap_tolerance(&self) -> Option<f64> {
         None
