@@ -29,12 +29,13 @@ fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[La
     let face = face(table);
     let surface =
         table.required("surface", "surface = { plane = { through_mm = [0, 0, 0], normal = [0, 0, 1] } }", |item| {
-            item.table(surface)
+            match item.table(surface)? {
+                SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } if kind == "sliding" => {
+                    item.out_of_range("a face that yields", "a rigid surface for sliding; [[contact]] can meet faces")
+                }
+                surface => Some(surface),
+            }
         });
-    if kind == "sliding" && matches!(surface, Some(SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. })) {
-        let item = table.item("surface")?;
-        return item.out_of_range("a face that yields", "a rigid surface for sliding; [[contact]] can meet faces");
-    }
     let law = table
         .required("law", "law = { penalty = { kpa_per_mm = 10 } }", |item| item.table(|table| table.one_of(laws)));
     let initials = [("refuse", InitialSpec::Refuse), ("relax", InitialSpec::Relax)];
