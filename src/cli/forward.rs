@@ -114,17 +114,17 @@ pub(super) fn probes(scene: &Scene, built: &Built) -> Vec<Probe> {
 
 /// Time and drive of every frame: one frame where all controls are constant, else one for every time of the curves.
 fn drives(scene: &Scene, built: &Built) -> Result<Vec<(f64, Drive)>> {
-    let muscles: Vec<String> = scene.muscles.iter().map(|m| m.name.clone()).collect();
-    // muscles driven by a table: name, controls, table
-    let mut curves: Vec<(&str, &[usize], Curves)> = Vec::new();
+    let ranges = scene.control_ranges();
+    // what a table drives: name, controls, table
+    let mut curves: Vec<(&str, Vec<usize>, Curves)> = Vec::new();
     let mut controls = vec![0.0; built.model.controls().len()];
     for control in &scene.controls {
-        let own = built.model.muscle_controls(&control.name);
-        if let ControlValue::Csv(path) = &control.value {
-            curves.push((&control.name, own, Curves::read(path, &muscles)?));
-        }
+        let own = built.model.controls_of(&control.name);
         for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
             controls[*k] = value;
+        }
+        if let ControlValue::Csv(path) = &control.value {
+            curves.push((&control.name, own, Curves::read(path, &ranges)?));
         }
     }
     let mut times: Vec<f64> = curves.iter().flat_map(|(.., c)| c.times_s.iter().copied()).collect();
