@@ -1,5 +1,6 @@
 //! From a scene to a model: every table of the problem file becomes a mesh, a term or a support.
 
+use super::bones::{attachments, bone, bones};
 use super::supports::{Conflict, Support, Supports, normal_axis};
 use super::tissue::{Host, tissue};
 use super::{Control, Ingredients, Model};
@@ -19,6 +20,7 @@ use crate::scene::{
     SurfaceSpec,
 };
 use crate::term::Term;
+use crate::term::bone::Bone;
 use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
 use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use crate::term::contact::{Contact, Interface};
@@ -26,10 +28,12 @@ use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, trac
 use crate::term::muscle::{Activation, Muscle, NotEmbedded};
 use crate::term::pressure::{self, PressureSpace};
 use crate::term::spring::{Resists, Springs};
+use std::sync::Arc;
 
 /// A model built from a scene, with the places in it that the scene names.
 pub struct Built {
-    /// The model; its controls are the activations of the muscles of the scene, one after the other.
+    /// The model; its controls are the activations of the muscles of the scene, one after the other, then the hinge and the
+    /// slide of every bone.
     pub model: Model,
     /// Where the probes of the scene are, in its order.
     pub probes: Vec<MaterialPoint>,
@@ -78,6 +82,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         let onset = if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 };
         controls.extend(names.into_iter().map(|name| Control { name, lower: 0.0, upper: 1.0, onset }));
     }
+    let bones = bones(scene, &mut controls);
     let point = |position: [f64; 3], what: &'static str, place: &Place| {
         locator.locate(position).map_err(|outside| Error::PointOutside {
             what,
@@ -90,7 +95,10 @@ pub fn build(scene: &Scene) -> Result<Built> {
     for (spec, allows) in slidings.chain(scene.contacts.iter().map(|spec| (spec, Allows::ClosedOrOpen))) {
         match contact(scene, spec, allows, &mesh) {
             Ok((contact, warning)) => {
-                terms.push(Box::new(contact));
+                terms.push(Box::new(match bone(&bones, &spec.bone) {
+                    Some(bone) => contact.on(bone),
+                    None => contact,
+                }));
                 warnings.extend(warning);
             }
             Err(error) => mistakes.push(error),
@@ -123,16 +131,16 @@ pub fn build(scene: &Scene) -> Result<Built> {
             },
         }
     }
-    let mut ties = Vec::new();
+    let mut tied = Vec::new();
     for attachment in &scene.attachments {
         match point(attachment.position_mm, "the attachment", &attachment.place) {
-            Ok(at) => ties.push((at, attachment.stiffness_mn_per_mm)),
+            Ok(at) => tied.push((attachment, at)),
             Err(error) => mistakes.push(error),
         }
     }
-    if !ties.is_empty() {
-        terms.push(Box::new(Springs::attachments(&mesh, &ties)));
-    }
+    // mu h, mN/mm: what the tissue around a point resists with
+    let resistance = shear_modulus * (volume / mesh.elements() as f64).cbrt();
+    terms.extend(attachments(&mesh, &bones, &tied, resistance));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {
@@ -146,7 +154,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     drop(locator);
-    let supports = match supports(scene, &mesh) {
+    let supports = match supports(scene, &mesh, &bones) {
         Ok(supports) => supports,
         Err(error) => {
             mistakes.push(error);
@@ -367,7 +375,7 @@ fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_ele
     })
 }
 
-fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
+fn supports(scene: &Scene, mesh: &Mesh, bones: &[Arc<Bone>]) -> Result<Supports> {
     let plane = |face: &FaceSpec, place: &Place| {
         normal_axis(mesh, &faces(scene, mesh, face, place)?)
             .ok_or_else(|| Error::NotNormalToAxis { face: face.to_string().into(), place: Box::new(place.clone()) })
@@ -375,7 +383,13 @@ fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
     let mut all = Vec::new();
     for spec in &scene.supports {
         all.push(match &spec.kind {
-            SupportKind::Clamp { face } => Support::Clamp { faces: faces(scene, mesh, face, &spec.place)? },
+            SupportKind::Clamp { face, bone: name } => {
+                let faces = faces(scene, mesh, face, &spec.place)?;
+                match bone(bones, name) {
+                    Some(bone) => Support::Carried { faces, bone },
+                    None => Support::Clamp { faces },
+                }
+            }
             SupportKind::Symmetry { face } => {
                 Support::Symmetry { faces: faces(scene, mesh, face, &spec.place)?, axis: plane(face, &spec.place)? }
             }

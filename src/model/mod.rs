@@ -1,6 +1,7 @@
 //! mesh + terms + supports -> energy, residual, tangent, control forces. Immutable, shared by all solves and threads.
 
 mod assembly;
+mod bones;
 pub mod build;
 mod constraints;
 mod numbering;

@@ -1,7 +1,8 @@
 //! `[[sliding]]` and `[[contact]]`: a face, the surface it meets, and the law between them.
 
+use super::bones::carried;
 use super::cursor::{FINITE, Item, POSITIVE, Reader, Table};
-use super::interpret::face;
+use super::interpret::{direction, face};
 use super::spec::*;
 
 type Contacts = Option<Vec<ContactSpec>>;
@@ -31,6 +32,7 @@ fn contact<'a>(table: &mut Table<'a>, default_name: &str, laws: &[LawReader<'a>]
         table.required("surface", "surface = { plane = { through_mm = [0, 0, 0], normal = [0, 0, 1] } }", |item| {
             item.table(surface)
         });
+    let bone = carried(table);
     let law = table
         .required("law", "law = { penalty = { kpa_per_mm = 10 } }", |item| item.table(|table| table.one_of(laws)));
     let initials = [("refuse", InitialSpec::Refuse), ("relax", InitialSpec::Relax)];
@@ -45,6 +47,7 @@ fn contact<'a>(table: &mut Table<'a>, default_name: &str, laws: &[LawReader<'a>]
         name: name?,
         face: face?,
         surface: surface?,
+        bone: bone?,
         law: law?,
         initial: initial?,
         gauss: gauss?,
@@ -99,13 +102,6 @@ fn capsule(table: &mut Table) -> Option<SurfaceSpec> {
 fn round(table: &mut Table) -> (Option<f64>, Option<bool>) {
     let radius_mm = table.required("radius_mm", "radius_mm = 20", |item| item.number(POSITIVE));
     (radius_mm, table.or("inside", false, |item| item.flag()))
-}
-
-fn direction(item: Item) -> Option<[f64; 3]> {
-    match item.numbers(FINITE)? {
-        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
-        direction => Some(direction),
-    }
 }
 
 fn stiffness(table: &mut Table) -> Option<f64> {
