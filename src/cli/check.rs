@@ -6,7 +6,7 @@ use super::terminal::print;
 use super::{Ending, Flags};
 use crate::error::{Missing, Result};
 use crate::model::Model;
-use crate::scene::Scene;
+use crate::scene::{ControlRange, Scene};
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
@@ -37,6 +37,13 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
     text += "effects on, with quadrature points per evaluation:\n";
     for (term, points) in model.terms().iter().zip(model.points()) {
         text += &format!("  {:<20} {points:>8}\n", term.name());
+    }
+    for bone in &scene.bones {
+        let ranges = ControlRange::of_bone(bone).into_iter();
+        let ranges = ranges.map(|ControlRange { name, kind, lower, upper }| {
+            format!("{name} from {lower} to {upper} {}", kind.unit())
+        });
+        text += &format!("  bone {:<15} {}\n", bone.name, ranges.collect::<Vec<_>>().join(", "));
     }
     text += &format!(
         "one Newton iteration: factorisation of {:.1} Mflop, {:.1} MB of factor\n",

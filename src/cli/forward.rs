@@ -10,7 +10,7 @@ use crate::fit::sequence::settings;
 use crate::forward::{Drive, Equilibrium, Solver, Work};
 use crate::model::build::Built;
 use crate::report::summary::ForwardSummary;
-use crate::report::{FailedFrame, Frame, Probe, Record, muscle_states, probe_states};
+use crate::report::{FailedFrame, Frame, Probe, Record, bone_states, muscle_states, probe_states};
 use crate::scene::{ControlValue, Curves, Scene};
 
 /// Solves every frame, writes it, prints the page.
@@ -79,6 +79,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
             frame: *frame,
             probes: &probe_states(&probes, model, &found.state),
             muscles: &muscle_states(model, &found.state, &found.evaluation),
+            bones: &bone_states(model, &found.state, &found.evaluation),
             tissue_energy: found.evaluation.energies[0],
             external_work: model.external_work(&found.state),
             reactions: &model.supports().rotation_reactions(model.mesh(), &found.evaluation.force, &x),

@@ -83,8 +83,7 @@ impl<'m> Fit<'m> {
         check_units(&markers, model.mesh(), recording, fit)?;
         let settings = settings(scene);
         let mut solver = Solver::new(model, settings)?;
-        let unknowns: Vec<usize> =
-            fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect();
+        let unknowns: Vec<usize> = fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect();
         let mut held = vec![0.0; model.controls().len()];
         let mut held_curves = Vec::new();
         let ranges = scene.control_ranges();

@@ -14,9 +14,12 @@ use std::sync::Arc;
 /// within a tenth.
 const ONSET: f64 = 10.0;
 
-/// The stiffness of a rigid tie in relation to what the tissue around a point resists with: a round of multipliers leaves
-/// about a thousandth of a gap.
-const TIE_STIFFNESS: f64 = 1e3;
+/// The stiffness of a rigid tie in relation to mu h, what the tissue around a point resists with: a round of multipliers leaves
+/// about 1e-4 of a gap.
+const TIE_STIFFNESS: f64 = 1e4;
+
+/// The gap that a rigid tie may have, in sizes of an element: what the balance leaves open is less.
+const TIE_TOLERANCE: f64 = 1e-9;
 
 /// All bones of a scene; their controls are added to those that there are.
 pub(super) fn bones(scene: &Scene, controls: &mut Vec<Control>) -> Vec<Arc<Bone>> {
@@ -33,10 +36,12 @@ pub(super) fn bones(scene: &Scene, controls: &mut Vec<Control>) -> Vec<Arc<Bone>
             control: control(),
         });
         let slide = spec.slide.map(|slide| Slide { direction: normalised(slide.direction), control: control() });
-        controls.extend(ControlRange::of_bone(spec).into_iter().map(|ControlRange { name, lower, upper, .. }| {
-            let onset = ONSET * (upper - lower);
-            Control { name, lower, upper, onset }
-        }));
+        controls.extend(ControlRange::of_bone(spec).into_iter().map(
+            |ControlRange { name, lower, upper, .. }| {
+                let onset = ONSET * (upper - lower);
+                Control { name, lower, upper, onset }
+            },
+        ));
         all.push(Arc::new(Bone::new(&spec.name, hinge, slide)));
     }
     all
@@ -49,12 +54,13 @@ pub(super) fn bone(bones: &[Arc<Bone>], name: &Option<String>) -> Option<Arc<Bon
 }
 
 /// The terms of all attachments, each with its material point: springs and rigid ties, to space and to every bone.
-/// `resistance` is what the tissue around a point resists with, mN/mm.
+/// `element_size` is in mm, the shear modulus of the tissue in kPa.
 pub(super) fn attachments(
     mesh: &Mesh,
     bones: &[Arc<Bone>],
     tied: &[(&AttachmentSpec, MaterialPoint)],
-    resistance: f64,
+    element_size: f64,
+    shear_modulus: f64,
 ) -> Vec<Box<dyn Term>> {
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     for body in std::iter::once(None).chain(bones.iter().map(Some)) {
@@ -76,7 +82,8 @@ pub(super) fn attachments(
         let rigid: Vec<MaterialPoint> =
             own().filter(|(spec, _)| spec.tie == TieSpec::Rigid).map(|(_, at)| *at).collect();
         if !rigid.is_empty() {
-            terms.push(Box::new(RigidTies::new(mesh, &rigid, body.cloned(), TIE_STIFFNESS * resistance)));
+            let (stiffness, tolerance) = (TIE_STIFFNESS * shear_modulus * element_size, TIE_TOLERANCE * element_size);
+            terms.push(Box::new(RigidTies::new(mesh, &rigid, body.cloned(), stiffness, tolerance)));
         }
     }
     terms

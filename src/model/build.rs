@@ -138,9 +138,8 @@ pub fn build(scene: &Scene) -> Result<Built> {
             Err(error) => mistakes.push(error),
         }
     }
-    // mu h, mN/mm: what the tissue around a point resists with
-    let resistance = shear_modulus * (volume / mesh.elements() as f64).cbrt();
-    terms.extend(attachments(&mesh, &bones, &tied, resistance));
+    let element_size = (volume / mesh.elements() as f64).cbrt();
+    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {

@@ -98,7 +98,12 @@ pub(super) fn known(root: &Node, mistakes: &Mistakes) {
         let bone = root.tables("bone").iter().find(|bone| bone.name().is_some_and(|(own, _)| control_of(own, name)));
         if let Some(bone) = bone.filter(|_| controls.iter().any(|control| control == name)) {
             let first_line = bone.place.line;
-            mistakes.add(Error::DuplicateName { kind: "control", name: name.into(), first_line, place: place.clone() });
+            mistakes.add(Error::DuplicateName {
+                kind: "control",
+                name: name.into(),
+                first_line,
+                place: place.clone(),
+            });
         }
     }
 }

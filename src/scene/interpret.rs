@@ -31,9 +31,8 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let (slidings, contacts) = contacts::both(file);
         let loads = file.tables("load", load);
         let attachments = file.tables("attachment", bones::attachment);
-        let controls = file.or("controls", Vec::new(), |item| {
-            references.controls(&item, muscles.as_deref(), bones.as_deref())
-        });
+        let controls =
+            file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref(), bones.as_deref()));
         let probes = file.tables("probe", probe);
         let fit = if fitting {
             file.required("fit", "[fit]\nmarkers = \"recording.mcap\"\nunits = \"m\"", |item| {

@@ -123,7 +123,9 @@ impl References {
                 }
                 _ => match of_bone {
                     Some(range) => pose(&control, range),
-                    None => control.number(ACTIVATION),
+                    None if known.is_some() => control.number(ACTIVATION),
+                    // of what is not known nothing is known
+                    None => control.number(FINITE),
                 }
                 .map(ControlValue::Constant),
             };

@@ -162,7 +162,8 @@ impl Carried for Springs {
         let mut wrench = Wrench::default();
         for spring in &self.points[state.element] {
             let pull = apply(&spring.stiffness, spring.elongation(self.bone.as_ref(), state));
-            let motion = self.bone.as_ref().map_or([0.0; 3], |bone| bone.pose(state.controls).motion(spring.reference));
+            let motion =
+                self.bone.as_ref().map_or([0.0; 3], |bone| bone.pose(state.controls).motion(spring.reference));
             wrench.add_force(pull.map(|f| -f), add_scaled(spring.reference, 1.0, motion));
         }
         wrench

@@ -14,9 +14,6 @@ use crate::math::tensor::{Vector, add_scaled, norm, subtract};
 use crate::mesh::{MaterialPoint, Mesh};
 use std::sync::Arc;
 
-/// The gap to which a tie is closed, mm.
-pub const TIE_TOLERANCE: f64 = 1e-6;
-
 /// Ties of some material points to one body.
 pub struct RigidTies {
     name: String,
@@ -27,6 +24,8 @@ pub struct RigidTies {
     of_element: Vec<Vec<usize>>,
     /// k, mN/mm.
     stiffness: f64,
+    /// The gap that may remain, mm.
+    tolerance: f64,
 }
 
 /// One tie; its multipliers are 3 k to 3 k + 2 for the k-th.
@@ -48,9 +47,15 @@ struct Met {
 }
 
 impl RigidTies {
-    /// Ties of `points` to a bone, or to where they were. The stiffness k (mN/mm) does not change what is found: a larger
-    /// one takes fewer rounds to close the gaps, until the tangent becomes inaccurate.
-    pub fn new(mesh: &Mesh, points: &[MaterialPoint], bone: Option<Arc<Bone>>, stiffness: f64) -> RigidTies {
+    /// Ties of `points` to a bone, or to where they were, closed to a gap of `tolerance` (mm). The stiffness k (mN/mm) does
+    /// not change what is found: a larger one takes fewer rounds to close the gaps, until the tangent becomes inaccurate.
+    pub fn new(
+        mesh: &Mesh,
+        points: &[MaterialPoint],
+        bone: Option<Arc<Bone>>,
+        stiffness: f64,
+        tolerance: f64,
+    ) -> RigidTies {
         let mut of_element = vec![Vec::new(); mesh.elements()];
         let mut ties = Vec::with_capacity(points.len());
         for at in points {
@@ -58,7 +63,7 @@ impl RigidTies {
             ties.push(Tie { values: mesh.element.values(at.xi), reference: mesh.position(*at) });
         }
         let on = bone.as_ref().map(|bone| format!(" on {}", bone.name())).unwrap_or_default();
-        RigidTies { name: format!("rigid attachment{on}"), bone, ties, of_element, stiffness }
+        RigidTies { name: format!("rigid attachment{on}"), bone, ties, of_element, stiffness, tolerance }
     }
 
     fn meet(&self, index: usize, state: &ElementState<'_>) -> Met {
@@ -146,7 +151,7 @@ impl Constraint for RigidTies {
     }
 
     fn tolerance(&self) -> f64 {
-        TIE_TOLERANCE
+        self.tolerance
     }
 
     fn renew(&self, state: &ElementState<'_>, multipliers: &mut [f64]) -> f64 {
