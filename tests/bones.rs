@@ -205,7 +205,7 @@ fn check(name: &str, parts: &[&str], scale: f64, tolerance: f64) {
         if let Some(work) = work[control] {
             let energy = slope(|h| vec![fetch(h).evaluation.energies.iter().sum()], step);
             println!("  work per unit {work:.6}, {:.6} by differences", energy[0]);
-            assert_close(&format!("{name}, work of control {control}"), &[work], &energy, 1e-5);
+            assert_close(&format!("{name}, work of control {control}"), &[work], &energy, 1e-7);
         }
     }
     let pressed = active.iter().filter(|a| **a).count();

@@ -622,7 +622,7 @@ fn bones_are_read_and_locked() {
         ("name = \"larynx\"", "name = \"jaw\"", "C008", "a second bone is called `jaw`"),
         ("bone = \"jaw\" }", "bone = \"jar\" }", "C009", "no bone is called `jar`"),
         ("bone = \"jaw\"\nlaw", "bone = \"jar\"\nlaw", "C009", "did you mean `jaw`?"),
-        ("bone = \"larynx\"\n[[att", "bone = \"pharynx\"\n[[att", "C009", "bones: jaw, larynx"),
+        ("bone = \"larynx\"\n[[att", "bone = \"hyoid\"\n[[att", "C009", "bones: jaw, larynx"),
         ("rigid = true", "rigid = true\nstiffness_mn_per_mm = 5", "C011", "`stiffness_mn_per_mm`, `rigid`"),
         ("rigid = true", "", "C011", "holds none"),
         ("rigid = true", "rigid = false", "C005", "true, or stiffness_mn_per_mm"),
