@@ -7,6 +7,7 @@
 //! [`Scene::read`] reads a file, merges `--set` overrides into it before anything is checked, and [`Scene::lock`]
 //! writes the result with nothing left unsaid.
 
+mod bones;
 mod contacts;
 mod cursor;
 mod curves;
@@ -51,6 +52,8 @@ pub struct Scene {
     pub regions: Vec<RegionSpec>,
     /// The muscles in it.
     pub muscles: Vec<MuscleSpec>,
+    /// Rigid bodies that move, and carry what is tied to them.
+    pub bones: Vec<BoneSpec>,
     /// What holds or moves its surface.
     pub supports: Vec<SupportSpec>,
     /// Faces that stay on a surface and slide along it.
@@ -59,9 +62,9 @@ pub struct Scene {
     pub contacts: Vec<ContactSpec>,
     /// The forces on it.
     pub loads: Vec<LoadSpec>,
-    /// Points of it that springs hold.
+    /// Points of it that are tied to space or to a bone.
     pub attachments: Vec<AttachmentSpec>,
-    /// Activations, in the order of the file; a muscle without one rests at 0.
+    /// Activations and poses of bones, in the order of the file; what has none rests at 0.
     pub controls: Vec<ControlSpec>,
     /// Points whose motion is written down.
     pub probes: Vec<ProbeSpec>,
@@ -116,6 +119,23 @@ impl Scene {
     /// Every mistake in the text and in the overrides.
     pub fn parse(text: &str, file: &str, folder: &Path, overrides: &[String]) -> Result<Scene> {
         interpret_text(text, file, folder, (overrides, &[]), false)
+    }
+
+    /// What the controls of the scene may be: the muscles, then the bones.
+    pub fn control_ranges(&self) -> Vec<ControlRange> {
+        let muscles = self.muscles.iter().map(|muscle| ControlRange::activation(&muscle.name));
+        muscles.chain(self.bones.iter().flat_map(ControlRange::of_bone)).collect()
+    }
+
+    /// Whether a bone carries anything.
+    fn carries(&self, bone: &BoneSpec) -> bool {
+        let clamped = self.supports.iter().filter_map(|support| match &support.kind {
+            SupportKind::Clamp { bone, .. } => bone.as_ref(),
+            _ => None,
+        });
+        let met = self.slidings.iter().chain(&self.contacts).filter_map(|contact| contact.bone.as_ref());
+        let tied = self.attachments.iter().filter_map(|attachment| attachment.bone.as_ref());
+        clamped.chain(met).chain(tied).any(|name| *name == bone.name)
     }
 }
 
@@ -203,9 +223,10 @@ fn interpret_text(
             mistakes.add(mistake);
         }
     }
-    for kind in ["muscle", "region", "probe", "marker", "sliding", "contact"] {
+    for kind in ["muscle", "region", "bone", "probe", "marker", "sliding", "contact"] {
         unique_names(&root, kind, &mistakes);
     }
+    bones::known(&root, &mistakes);
     let references = References::new(&root, &folder, on_disk);
     let scene = interpret::scene(&root, &default_name(file, &folder), &references, &mistakes);
     let mistakes = mistakes.sorted(file);
@@ -261,6 +282,14 @@ fn warnings(scene: &Scene, file: &Arc<str>) -> Vec<Warning> {
                 .into(),
             place: Some(load.place.clone()),
             help: Some("write sensitivity = \"finite-difference\" in [fit] if the fit is slow or stalls".into()),
+        });
+    }
+    for bone in scene.bones.iter().filter(|bone| !scene.carries(bone)) {
+        warnings.push(Warning {
+            code: "C021",
+            message: format!("nothing is tied to the bone `{}`: its motion changes nothing", bone.name),
+            place: Some(bone.place.clone()),
+            help: Some(format!("write bone = \"{}\" in a clamp, sliding, contact or attachment", bone.name)),
         });
     }
     if let (Some(marker), Task::Forward) = (scene.markers.first(), scene.task) {

@@ -3,7 +3,8 @@
 /// Indices of the pairs (error, seconds) that no other pair beats or equals in both, cheapest first. Pairs with a value
 /// that is not finite are left out.
 pub fn front(pairs: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..pairs.len()).filter(|k| pairs[*k].0.is_finite() && pairs[*k].1.is_finite()).collect();
+    let mut order: Vec<usize> =
+        (0..pairs.len()).filter(|k| pairs[*k].0.is_finite() && pairs[*k].1.is_finite()).collect();
     order.sort_by(|a, b| pairs[*a].1.total_cmp(&pairs[*b].1).then(pairs[*a].0.total_cmp(&pairs[*b].0)));
     let mut least = f64::INFINITY;
     order.retain(|k| {

@@ -52,9 +52,13 @@ pub fn against_solution(own: (&Prepared, &Solution), reference: (&Prepared, &Sol
         errors.set(Measure::Probes, probes.map(of_probe).fold(0.0, f64::max));
     }
     if !found.markers.is_empty() && found.markers.len() == known.markers.len() {
-        let squares = found.markers.iter().zip(&known.markers).flat_map(|(a, b)| pairs().map(|s| distance(*a, *b, s).powi(2)));
+        let squares =
+            found.markers.iter().zip(&known.markers).flat_map(|(a, b)| pairs().map(|s| distance(*a, *b, s).powi(2)));
         errors.set(Measure::Markers, root_mean(squares));
-        errors.set(Measure::Activations, root_mean(pairs().flat_map(|(a, b)| squares_between(&a.controls, &b.controls))));
+        errors.set(
+            Measure::Activations,
+            root_mean(pairs().flat_map(|(a, b)| squares_between(&a.controls, &b.controls))),
+        );
     }
     if let (Some(own), Some(known)) = (found.frames.last(), known.frames.last()) {
         if let Some([displacement, gradient, det_f]) = fields(mesh, &own.state, best_mesh, &known.state) {
@@ -82,7 +86,10 @@ pub fn against_values(problem: &Prepared, found: &Solution, values: &[(String, f
         let component = ["ux_mm", "uy_mm", "uz_mm"].iter().position(|c| *c == component)?;
         Some((mesh.interpolate(problem.built.probes[index], &last.state.u)[component] - value).abs())
     };
-    let worst = values.iter().map(|v| difference(v).unwrap_or(f64::NAN)).fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) });
+    let worst = values
+        .iter()
+        .map(|v| difference(v).unwrap_or(f64::NAN))
+        .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) });
     errors.set(Measure::Probes, worst);
     errors
 }
@@ -92,8 +99,8 @@ pub fn against_values(problem: &Prepared, found: &Solution, values: &[(String, f
 /// # Errors
 /// A table that cannot be read.
 pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -> Result<Errors> {
-    let names: Vec<String> = problem.built.model.controls().iter().map(|c| c.name.clone()).collect();
-    let truth = Curves::read(table, &names)?;
+    let names: Vec<&str> = problem.built.model.controls().iter().map(|c| c.name.as_str()).collect();
+    let truth = Curves::read(table, &problem.scene.control_ranges())?;
     let squares = found.frames.iter().zip(&found.times_s).flat_map(|(frame, time_s)| {
         let known = names.iter().zip(&frame.state.controls);
         known.filter_map(|(name, value)| Some((truth.at(name, *time_s)? - value).powi(2))).collect::<Vec<f64>>()

@@ -70,8 +70,7 @@ impl Prepared {
                 let markers = placement::place(&self.scene, spec, self.built.model.mesh(), recording)?;
                 let start = Instant::now();
                 let mut fit = Fit::new(&self.built.model, &self.scene, spec, recording)?;
-                let found: Vec<_> =
-                    frames.iter().map(|frame| fit.frame(recording, *frame)).collect::<Result<_>>()?;
+                let found: Vec<_> = frames.iter().map(|frame| fit.frame(recording, *frame)).collect::<Result<_>>()?;
                 Ok(Solution {
                     seconds: start.elapsed().as_secs_f64(),
                     times_s: found.iter().map(|estimate| estimate.time_s).collect(),

@@ -164,9 +164,7 @@ impl<'s> Sweep<'s> {
             let prepared = Prepared::read(&self.study.problem, &variant.change)?;
             let solution = with_threads(&variant.change, || prepared.solve())?;
             let errors = match reference {
-                Reference::Solved(best) => {
-                    norms::against_solution((&prepared, &solution), (&best.0, &best.1))
-                }
+                Reference::Solved(best) => norms::against_solution((&prepared, &solution), (&best.0, &best.1)),
                 Reference::Values(values) => norms::against_values(&prepared, &solution, values),
                 Reference::Activations(table) => norms::against_activations(&prepared, &solution, table)?,
             };
@@ -212,4 +210,3 @@ fn with_threads<T: Send>(change: &Change, solve: impl FnOnce() -> Result<T> + Se
     })?;
     pool.install(solve)
 }
-

@@ -30,11 +30,8 @@ pub fn variants(study: &Study) -> Vec<Variant> {
         let change = chosen.fold(Change::default(), |change, (_, level)| change.then(&level.change));
         Variant { name: named.join(", "), levels: Some(levels), change }
     };
-    let spelled = study.variants.iter().map(|v| Variant {
-        name: v.name.clone(),
-        levels: None,
-        change: v.change.clone(),
-    });
+    let spelled =
+        study.variants.iter().map(|v| Variant { name: v.name.clone(), levels: None, change: v.change.clone() });
     combinations.into_iter().map(of_levels).chain(spelled).collect()
 }
 

@@ -42,10 +42,8 @@ pub(super) fn write(study: &Study, outcome: &Outcome) -> String {
         seconds: pairs[k].1,
         set: usable[k].variant.change.set.clone(),
     };
-    let front = Front {
-        measure: study.measure.word().into(),
-        setting: front(&pairs).into_iter().map(choice).collect(),
-    };
+    let front =
+        Front { measure: study.measure.word().into(), setting: front(&pairs).into_iter().map(choice).collect() };
     let head = "# Written by a study: settings that no other beats in error and time, cheapest first.\n\
                 # Put it beside the problem file; `risorius run --accuracy 0.1mm` then chooses from it.\n";
     head.to_owned() + &toml::to_string(&front).unwrap_or_default()

@@ -192,7 +192,11 @@ fn cost(study: &Study, outcome: &Outcome, text: &mut String) -> Drawn {
     let mut parts: Vec<String> = Vec::new();
     for (_, s) in &solved {
         let names = s.effects.iter().cloned().chain(["factorisation".to_owned(), "solve".to_owned()]);
-        names.for_each(|name| if !parts.contains(&name) { parts.push(name) });
+        names.for_each(|name| {
+            if !parts.contains(&name) {
+                parts.push(name)
+            }
+        });
     }
     let share = |s: &Solved, part: &str| -> f64 {
         let effects: f64 =
@@ -229,7 +233,10 @@ fn cost(study: &Study, outcome: &Outcome, text: &mut String) -> Drawn {
     }
     for (k, part) in parts.iter().enumerate() {
         let y = 56 + 24 * solved.len() as i32 + 18 * k as i32;
-        area.draw(&Rectangle::new([(left as i32, y), (left as i32 + 14, y + 12)], COLOURS[k % COLOURS.len()].filled()))?;
+        area.draw(&Rectangle::new(
+            [(left as i32, y), (left as i32 + 14, y + 12)],
+            COLOURS[k % COLOURS.len()].filled(),
+        ))?;
         area.draw(&Text::new(part.clone(), (left as i32 + 22, y), words(12).color(&BLACK)))?;
     }
     area.present()?;

@@ -146,7 +146,8 @@ pub(super) fn refinements<'o>(
                 (Some(a), Some(b)) => (0..a.len()).all(|j| (j == k) != (a[j] == b[j])),
                 _ => false,
             };
-            let smaller = outcome.variants.iter().filter(alike).filter(|to| size(to) < size(from) && size(to).is_some());
+            let smaller =
+                outcome.variants.iter().filter(alike).filter(|to| size(to) < size(from) && size(to).is_some());
             let next = smaller.max_by(|a, b| size(a).partial_cmp(&size(b)).unwrap_or(std::cmp::Ordering::Equal));
             all.extend(next.map(|to| (factor.name.as_str(), from, to)));
         }
