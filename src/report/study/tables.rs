@@ -6,6 +6,9 @@ use crate::study::front::front;
 use crate::study::order::observed;
 use crate::study::{Outcome, Solved, VariantResult};
 
+/// Element sizes that differ by less are the same.
+const SAME_SIZE: f64 = 1e-3;
+
 /// `study.csv`: a row per variant.
 pub(super) fn variants(study: &Study, outcome: &Outcome) -> String {
     let measures: Vec<Measure> = Measure::ALL.into_iter().filter(|m| applies(outcome, *m)).collect();
@@ -146,8 +149,11 @@ pub(super) fn refinements<'o>(
                 (Some(a), Some(b)) => (0..a.len()).all(|j| (j == k) != (a[j] == b[j])),
                 _ => false,
             };
-            let smaller =
-                outcome.variants.iter().filter(alike).filter(|to| size(to) < size(from) && size(to).is_some());
+            // sizes come from the quadrature of the volume: the same mesh has not always the same bits
+            let is_finer = |to: &&VariantResult| {
+                size(to).zip(size(from)).is_some_and(|(fine, coarse)| fine < (1.0 - SAME_SIZE) * coarse)
+            };
+            let smaller = outcome.variants.iter().filter(alike).filter(is_finer);
             let next = smaller.max_by(|a, b| size(a).partial_cmp(&size(b)).unwrap_or(std::cmp::Ordering::Equal));
             all.extend(next.map(|to| (factor.name.as_str(), from, to)));
         }
