@@ -17,11 +17,13 @@ mod nearest;
 mod overrides;
 mod references;
 mod spec;
+mod study;
 mod tree;
 mod units;
 
 pub use curves::Curves;
 pub use spec::*;
+pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};
 pub use units::Units;
 
 use crate::error::{Error, Result, Warning};
@@ -98,11 +100,16 @@ impl Scene {
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, otherwise every mistake in it and in the overrides.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Scene> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
-        let file = path.display().to_string();
-        let text = String::from_utf8(bytes).map_err(|error| not_unicode(&file, &error))?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        interpret_text(&text, &file, folder, overrides, true)
+        Scene::read_changed(path, overrides, &[])
+    }
+
+    /// As [`Scene::read`], without the keys and tables that `without` names, for example `contact.table`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`]; something named that is not there.
+    pub fn read_changed(path: &Path, overrides: &[String], without: &[String]) -> Result<Scene> {
+        let file = File::read(path)?;
+        interpret_text(&file.text, &file.name, file.folder, (overrides, without), true)
     }
 
     /// Reads a problem from a text, without looking at any other file. `file` is what messages call it, and relative
@@ -111,7 +118,7 @@ impl Scene {
     /// # Errors
     /// Every mistake in the text and in the overrides.
     pub fn parse(text: &str, file: &str, folder: &Path, overrides: &[String]) -> Result<Scene> {
-        interpret_text(text, file, folder, overrides, false)
+        interpret_text(text, file, folder, (overrides, &[]), false)
     }
 
     /// What the controls of the scene may be: the muscles, then the bones.
@@ -132,6 +139,61 @@ impl Scene {
     }
 }
 
+/// What a file asks for.
+pub enum Problem {
+    /// To solve one problem.
+    Scene(Box<Scene>),
+    /// To solve a problem in many ways.
+    Study(Box<Study>),
+}
+
+impl Problem {
+    /// Reads a file; overrides as for [`Scene::read`].
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Problem> {
+        let file = File::read(path)?;
+        let mut root = Source::new(&file.name, &file.text).tree().map_err(Error::all)?;
+        if !study::is_study(&root) {
+            return Scene::read(path, overrides).map(|scene| Problem::Scene(Box::new(scene)));
+        }
+        let mistakes = Mistakes::default();
+        for (index, argument) in overrides.iter().enumerate() {
+            if let Err(mistake) = overrides::apply(&mut root, argument, index + 1) {
+                mistakes.add(mistake);
+            }
+        }
+        let folder = absolute(file.folder)?;
+        let study = study::study(&root, &default_name(&file.name, &folder), &folder, &mistakes);
+        match (study, mistakes.sorted(&file.name)) {
+            (Some(study), mistakes) if mistakes.is_empty() => Ok(Problem::Study(Box::new(study))),
+            (_, mistakes) => Err(Error::all(mistakes)),
+        }
+    }
+}
+
+/// A problem file as text.
+struct File<'p> {
+    name: String,
+    text: String,
+    folder: &'p Path,
+}
+
+impl File<'_> {
+    fn read(path: &Path) -> Result<File<'_>> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
+        let name = path.display().to_string();
+        let text = String::from_utf8(bytes).map_err(|error| not_unicode(&name, &error))?;
+        Ok(File { name, text, folder: path.parent().unwrap_or(Path::new("")) })
+    }
+}
+
+fn absolute(folder: &Path) -> Result<PathBuf> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    std::path::absolute(folder).map_err(|source| Error::Io { action: "find", path: folder.into(), source })
+}
+
 fn not_unicode(file: &str, error: &std::string::FromUtf8Error) -> Error {
     let good = error.utf8_error().valid_up_to();
     let text = String::from_utf8_lossy(error.as_bytes());
@@ -139,10 +201,14 @@ fn not_unicode(file: &str, error: &std::string::FromUtf8Error) -> Error {
     Error::Syntax { message: "it is not UTF-8 text".into(), place }
 }
 
-fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], on_disk: bool) -> Result<Scene> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let folder =
-        std::path::absolute(folder).map_err(|source| Error::Io { action: "find", path: folder.into(), source })?;
+fn interpret_text(
+    text: &str,
+    file: &str,
+    folder: &Path,
+    (overrides, without): (&[String], &[String]),
+    on_disk: bool,
+) -> Result<Scene> {
+    let folder = absolute(folder)?;
     let mut root = Source::new(file, text).tree().map_err(Error::all)?;
     let mistakes = Mistakes::default();
     flatten_controls(&mut root);
@@ -151,6 +217,11 @@ fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], o
             mistakes.add(mistake);
         }
         flatten_controls(&mut root);
+    }
+    for path in without {
+        if let Err(mistake) = overrides::remove(&mut root, path) {
+            mistakes.add(mistake);
+        }
     }
     for kind in ["muscle", "region", "bone", "probe", "marker", "sliding", "contact"] {
         unique_names(&root, kind, &mistakes);
