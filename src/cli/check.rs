@@ -3,13 +3,18 @@
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
 use super::terminal::print;
-use super::{Ending, Flags};
+use super::{Ending, Flags, study};
 use crate::error::{Missing, Result};
 use crate::model::Model;
-use crate::scene::{ControlRange, Scene};
+use crate::scene::{ControlRange, Problem, Scene};
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
+    if let Some(path) = path
+        && let Problem::Study(study) = Problem::read(path, &flags.set)?
+    {
+        return study::check(&study);
+    }
     let source = Source::read(path, flags)?;
     let Prepared { built, clip, warnings } = prepare(&source)?;
     let mut page = describe(&source.scene, &built.model);

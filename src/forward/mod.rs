@@ -1,6 +1,7 @@
 //! Equilibrium: from one state to another along a path of controls, loads and prescribed motion.
 
 mod balance;
+pub mod drives;
 
 use crate::error::{Error, Result};
 use crate::math::factor;

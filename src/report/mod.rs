@@ -20,6 +20,7 @@ pub mod pvd;
 pub mod record;
 pub mod run_folder;
 pub mod status;
+pub mod study;
 pub mod summary;
 pub mod tables;
 pub mod view;

@@ -96,7 +96,7 @@ impl Default for FramesSpec {
 
 fn task(table: &mut Table) -> Option<Task> {
     let kinds = [("forward", Task::Forward), ("fit", Task::Fit)];
-    let later = [("fibres", "fits fibre angles to measured directions"), ("study", "error against time")];
+    let later = [("fibres", "fits fibre angles to measured directions")];
     table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &later))
 }
 

@@ -69,7 +69,8 @@ impl<'a> From<&'a str> for Cell<'a> {
 /// Rows of cells as text.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    text: String,
+    /// The rows so far.
+    pub(in crate::report) text: String,
 }
 
 impl Rows {
