@@ -138,7 +138,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     let element_size = (volume / mesh.elements() as f64).cbrt();
-    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus));
+    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus, scene.solver.tolerance));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {
