@@ -32,11 +32,12 @@ impl Geometry {
     /// The warning that the mesh is not everywhere the field of the file; `place` is where the file is named.
     pub fn warning(&self, place: &Place) -> Option<Warning> {
         let Conversion { difference, element, xi: [a, b, c] } = self.conversion?;
+        let difference = if difference < 0.001 { format!("{difference:.1e}") } else { format!("{difference:.3}") };
         Some(Warning {
             code: "G025",
             message: format!(
                 "field `{}` is no tricubic Hermite in x, y and z: the mesh has its values and derivatives at the corners of \
-                 every element and differs from it by up to {difference:.2e} mm between them (element {element}, xi {a} {b} \
+                 every element and differs from it by up to {difference} mm between them (element {element}, xi {a} {b} \
                  {c})",
                 self.field
             ),
