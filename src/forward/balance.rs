@@ -3,7 +3,7 @@
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
 use crate::math::factor::{self, Factor};
-use crate::model::{Evaluation, Model, State, Tangent, Workspace, WorstPoint};
+use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Equations};
 use crate::term::Want;
 use std::sync::Arc;
@@ -42,7 +42,20 @@ pub(super) struct Balance<'m> {
     lifted_gap: Option<Vec<[f64; 3]>>,
     lifted: Option<Vec<f64>>,
     worst: WorstPoint,
+    /// Why the state last assessed was not admissible, if a face has left its surface.
+    pub off_surface: Option<OffSurface>,
+    /// Holds the body back while it is let go.
+    pub drag: Option<Drag>,
     work: Work,
+}
+
+/// Forces strength x weights x (x - from) on the unknowns.
+pub(super) struct Drag {
+    pub strength: f64,
+    /// mN/mm, zero for pressures.
+    pub weights: Arc<Vec<f64>>,
+    /// The unknowns where it is at rest.
+    pub from: Vec<f64>,
 }
 
 /// A Newton step: free unknowns, and the prescribed motion that comes with it.
@@ -69,6 +82,8 @@ impl<'m> Balance<'m> {
             lifted_gap: None,
             lifted: None,
             worst: WorstPoint { min: 1.0, element: 0, point: 0, max: 1.0 },
+            off_surface: None,
+            drag: None,
             work: Work { points: vec![0; terms], term_seconds: vec![0.0; terms], ..Work::default() },
         })
     }
@@ -120,6 +135,18 @@ impl<'m> Balance<'m> {
     pub fn negative_modes(&self) -> Option<usize> {
         let pressures = self.model.numbering().pressures();
         self.factored.then(|| self.factor.inertia().negative.saturating_sub(pressures))
+    }
+
+    /// Factorises the tangent at a state, to see its negative modes.
+    pub fn inspect(&mut self, state: &State) -> Result<()> {
+        self.evaluate(state, Want::Stiffness, None);
+        self.assemble();
+        self.refactor()
+    }
+
+    /// K x = b with the tangent that is factorised.
+    pub fn solve_factored(&mut self, rhs: &mut [f64]) -> Result<()> {
+        self.factor.solve(&self.tangent.matrix, rhs, 1, STEP_TOLERANCE).map(|_| ())
     }
 
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
@@ -187,7 +214,13 @@ impl<'m> Balance<'m> {
 
     fn evaluate(&mut self, state: &State, want: Want, gap: Option<&[[f64; 3]]>) -> Evaluation {
         let start = Instant::now();
-        let evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
+        let mut evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
+        if let Some(Drag { strength, weights, from }) = &self.drag {
+            let moved = self.model.unknowns(state).into_iter().zip(from).map(|(x, from)| x - from);
+            for ((r, weight), moved) in evaluation.residual.iter_mut().zip(weights.iter()).zip(moved) {
+                *r += strength * weight * moved;
+            }
+        }
         self.work.assembly_seconds += seconds_since(start);
         match want {
             Want::Force => self.work.force_evaluations += 1,
@@ -205,6 +238,9 @@ impl<'m> Balance<'m> {
     fn assemble(&mut self) {
         let start = Instant::now();
         self.model.assemble(&self.workspace, &mut self.tangent);
+        if let Some(drag) = &self.drag {
+            self.tangent.matrix.add_diagonal(drag.strength, &drag.weights);
+        }
         self.work.assembly_seconds += seconds_since(start);
     }
 
@@ -259,10 +295,13 @@ impl Equations for Balance<'_> {
         self.worst = evaluation.det_f;
         let residual = self.norm(&evaluation.residual);
         self.residual = evaluation.residual;
+        let admissible = evaluation.det_f.min > 0.0 && residual.is_finite();
+        let another_reason = !admissible && evaluation.det_f.min > 0.0;
+        self.off_surface = if another_reason { self.model.off_surface(state) } else { None };
         Assessment {
             residual,
             required: self.tolerance * evaluation.magnitude + ROUNDING * self.model.force_scale(),
-            admissible: evaluation.det_f.min > 0.0 && residual.is_finite(),
+            admissible,
             outstanding: self.gap.is_some(),
         }
     }

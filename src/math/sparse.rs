@@ -195,6 +195,12 @@ impl SymmetricMatrix {
         first_of_column.iter().map(|&entry| self.values[entry]).collect()
     }
 
+    /// a_jj += scale d_j.
+    pub fn add_diagonal(&mut self, scale: f64, d: &[f64]) {
+        let (first_of_column, _) = self.pattern.col_ptr().split_at(self.pattern.n());
+        first_of_column.iter().zip(d).for_each(|(&entry, d)| self.values[entry] += scale * d);
+    }
+
     /// y = A x for one vector of length n. The same bits for any number of threads.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         self.multiply_columns(x, y, 1);

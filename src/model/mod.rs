@@ -4,6 +4,7 @@ mod assembly;
 pub mod build;
 mod constraints;
 mod numbering;
+mod signs;
 mod state;
 pub mod supports;
 mod tissue;
@@ -11,6 +12,7 @@ mod tissue;
 pub use assembly::{Evaluation, Tangent, Workspace, WorstPoint};
 pub use constraints::Renewal;
 pub use numbering::Numbering;
+pub use signs::{Descending, OffSurface};
 pub use state::State;
 
 use crate::error::Result;

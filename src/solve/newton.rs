@@ -49,7 +49,8 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    fn converged(&self) -> bool {
+    /// Whether the state counts as a solution.
+    pub fn converged(&self) -> bool {
         self.admissible && !self.outstanding && self.residual <= self.required
     }
 }
