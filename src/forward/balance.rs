@@ -3,6 +3,7 @@
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
 use crate::math::factor::{self, Factor};
+use crate::math::sparse::SymmetricMatrix;
 use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Equations};
 use crate::term::Want;
@@ -49,13 +50,23 @@ pub(super) struct Balance<'m> {
     work: Work,
 }
 
-/// Forces strength x weights x (x - from) on the unknowns.
+/// Forces strength x D (x - from) on the unknowns.
+#[derive(Clone)]
 pub(super) struct Drag {
     pub strength: f64,
-    /// mN/mm, zero for pressures.
-    pub weights: Arc<Vec<f64>>,
+    /// D, mN/mm: the stiffness at rest, without rows and columns of pressures.
+    pub stiffness: Arc<SymmetricMatrix>,
     /// The unknowns where it is at rest.
     pub from: Vec<f64>,
+}
+
+impl Drag {
+    /// D v
+    pub fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; v.len()];
+        self.stiffness.multiply(v, &mut product);
+        product
+    }
 }
 
 /// A Newton step: free unknowns, and the prescribed motion that comes with it.
@@ -144,6 +155,19 @@ impl<'m> Balance<'m> {
         self.refactor()
     }
 
+    /// The stiffness of the body at rest without its pressures.
+    pub fn stiffness_at_rest(&mut self) -> SymmetricMatrix {
+        let model = self.model;
+        self.evaluate(&model.rest(), Want::Stiffness, None);
+        self.assemble();
+        self.factored = false;
+        let mut matrix = self.tangent.matrix.clone();
+        let mut kept = vec![true; model.numbering().unknowns()];
+        (0..model.numbering().pressures()).for_each(|k| kept[model.numbering().pressure_unknown(k)] = false);
+        matrix.keep(&kept);
+        matrix
+    }
+
     /// K x = b with the tangent that is factorised.
     pub fn solve_factored(&mut self, rhs: &mut [f64]) -> Result<()> {
         self.factor.solve(&self.tangent.matrix, rhs, 1, STEP_TOLERANCE).map(|_| ())
@@ -215,11 +239,11 @@ impl<'m> Balance<'m> {
     fn evaluate(&mut self, state: &State, want: Want, gap: Option<&[[f64; 3]]>) -> Evaluation {
         let start = Instant::now();
         let mut evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
-        if let Some(Drag { strength, weights, from }) = &self.drag {
-            let moved = self.model.unknowns(state).into_iter().zip(from).map(|(x, from)| x - from);
-            for ((r, weight), moved) in evaluation.residual.iter_mut().zip(weights.iter()).zip(moved) {
-                *r += strength * weight * moved;
-            }
+        if let Some(drag) = &self.drag {
+            let moved: Vec<f64> =
+                self.model.unknowns(state).iter().zip(&drag.from).map(|(x, from)| x - from).collect();
+            let force = drag.times(&moved);
+            evaluation.residual.iter_mut().zip(force).for_each(|(r, f)| *r += drag.strength * f);
         }
         self.work.assembly_seconds += seconds_since(start);
         match want {
@@ -239,7 +263,7 @@ impl<'m> Balance<'m> {
         let start = Instant::now();
         self.model.assemble(&self.workspace, &mut self.tangent);
         if let Some(drag) = &self.drag {
-            self.tangent.matrix.add_diagonal(drag.strength, &drag.weights);
+            self.tangent.matrix.add_scaled(drag.strength, &drag.stiffness);
         }
         self.work.assembly_seconds += seconds_since(start);
     }

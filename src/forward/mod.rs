@@ -384,10 +384,13 @@ impl<'m> Solver<'m> {
         Ok(outcome)
     }
 
-    /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side.
+    /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side; the forces
+    /// of fibres have kinks too, but there only a body that is let go has no shorter step to get past them.
     fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
         let outcome = newton(&mut self.balance, start, limits)?;
-        if outcome.stop != Some(Stop::NoDescent) || self.balance.model.contacts().next().is_none() {
+        let model = self.balance.model;
+        let kinks = model.contacts().next().is_some() || (self.balance.drag.is_some() && model.muscles().next().is_some());
+        if outcome.stop != Some(Stop::NoDescent) || !kinks {
             return Ok(outcome);
         }
         let mut iterations = outcome.iterations;

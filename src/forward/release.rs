@@ -2,15 +2,16 @@
 //!
 //!   r(x) + s D (u - u_before) = 0,  s -> 0
 //! is an implicit step of length 1/s of the motion D du/dt = - r, which runs downhill in energy until it ends in a stable
-//! equilibrium (pseudo-transient continuation: Kelley and Keyes 1998). Where K has negative modes K + s D has none for an s
-//! that is large enough, and only then a step is believed. A body that rests on a saddle is pushed off along a negative mode.
+//! equilibrium (pseudo-transient continuation: Kelley and Keyes 1998). D is the stiffness at rest, as of a viscous body, so
+//! that slender parts and small ones are held back alike. Where K has negative modes K + s D has none for an s that is large
+//! enough, and only then a step is believed. A body that rests on a saddle is pushed off along a negative mode.
 
 use super::balance::Drag;
-use super::{DAMPING, Solver, Step, StepKind, step};
+use super::{Solver, Step, StepKind, step};
 use crate::error::Result;
 use crate::math::tensor::{norm, subtract};
 use crate::model::State;
-use crate::solve::newton::{Assessment, Equations, Iteration, Limits, Test, newton};
+use crate::solve::newton::{Assessment, Equations, Iteration, Limits, Test};
 use std::sync::Arc;
 
 /// The body lost its balance on a path and came to the stable equilibrium beyond.
@@ -27,15 +28,25 @@ pub struct Snap {
 /// Times that a body may snap on one path.
 const MOST_SNAPS: usize = 8;
 /// Steps of the motion, failed ones included.
-const MOST_STEPS: usize = 100;
+const MOST_STEPS: usize = 200;
+/// Newton iterations of all steps.
+const MOST_ITERATIONS: usize = 400;
+/// Newton iterations of one step.
+const STEP_ITERATIONS: usize = 15;
+/// Steps after one that failed in which the drag does not become weaker.
+const CAUTIOUS_STEPS: usize = 3;
 /// Times that it is pushed off a saddle.
 const MOST_PUSHES: usize = 4;
-/// Strength of the drag to start with: that of the tissue over an element.
+/// Strength of the drag to start with: as much again as the stiffness at rest.
 const FIRST_DRAG: f64 = 1.0;
 /// A drag beyond this holds everything.
-const STRONGEST_DRAG: f64 = 1e6;
+const STRONGEST_DRAG: f64 = 1e5;
 /// The weakest drag with which a negative mode is sought.
-const WEAKEST_DRAG: f64 = 1e-8;
+const WEAKEST_DRAG: f64 = 1e-6;
+/// A step is predicted from the one before no farther than so many times that.
+const FARTHEST: f64 = 3.0;
+/// The smallest part of a Newton step: with a drag there is no shorter step of a path to be had.
+const RELEASE_DAMPING: f64 = 0.02;
 /// A push moves no parameter by more than this part of an element.
 const PUSH: f64 = 0.02;
 /// Iterations for the direction of a negative mode.
@@ -74,39 +85,54 @@ impl Solver<'_> {
 
     fn descend(&mut self, start: &State, last: &State) -> Result<Option<Released>> {
         let model = self.balance.model;
-        let weights = Arc::new(model.drag());
-        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        let iterations = self.settings.max_iterations.min(STEP_ITERATIONS);
+        let limits = Limits { iterations, damping: RELEASE_DAMPING, test: Test::Monotone };
         let mut state = self.balance.at_target(start.clone());
-        let mut strength = FIRST_DRAG;
+        let stiffness = Arc::new(self.balance.stiffness_at_rest());
+        let mut drag = Drag { strength: FIRST_DRAG, stiffness, from: model.unknowns(&state) };
+        // the state before, and the drag on the way from there
+        let mut before: Option<(State, f64)> = None;
         let mut iterations = Vec::new();
         let mut pushes = 0;
+        let mut cautious = 0;
         for _ in 0..MOST_STEPS {
-            self.balance.drag = Some(Drag { strength, weights: weights.clone(), from: model.unknowns(&state) });
-            let outcome = newton(&mut self.balance, state.clone(), limits);
+            if iterations.len() >= MOST_ITERATIONS || drag.strength > STRONGEST_DRAG {
+                return Ok(None);
+            }
+            drag.from = model.unknowns(&state);
+            self.balance.drag = Some(drag.clone());
+            // the velocity stays about the same: distances are as 1/s
+            let guess = before.as_ref().map_or_else(
+                || state.clone(),
+                |(earlier, then)| self.balance.extrapolate(earlier, &state, (then / drag.strength).min(FARTHEST)),
+            );
+            let outcome = self.attempt(guess, &state, limits);
+            if std::env::var("TRACE").is_ok() {
+                if let Ok(outcome) = &outcome {
+                eprintln!("  s {:.1e} its {} stop {:?} modes {:?} res {:.1e} req {:.1e} last factor {:?} detF {:?}", drag.strength, outcome.iterations.len(), outcome.stop, self.balance.negative_modes(), outcome.last.residual, outcome.last.required, outcome.iterations.last().map(|i| i.factor), self.balance.worst_point().min);
+                }
+            }
             let Ok(outcome) = outcome else {
-                strength *= 10.0;
+                (drag.strength, cautious) = (3.0 * drag.strength, CAUTIOUS_STEPS);
                 continue;
             };
             let taken = outcome.iterations.len();
-            if std::env::var("TRACE").is_ok() {
-                eprintln!("  s {strength:.1e} its {taken} stop {:?} modes {:?} res {:.1e} req {:.1e} last factor {:?} detF {:?}", outcome.stop, self.balance.negative_modes(), outcome.last.residual, outcome.last.required, outcome.iterations.last().map(|i| i.factor), self.balance.worst_point().min);
-            }
             let downhill = taken == 0 || self.balance.negative_modes() == Some(0);
             iterations.extend(outcome.iterations);
             if outcome.stop.is_some() || !downhill {
-                strength *= 10.0;
-                if strength > STRONGEST_DRAG {
-                    return Ok(None);
-                }
+                (drag.strength, cautious) = (3.0 * drag.strength, CAUTIOUS_STEPS);
                 continue;
             }
-            state = outcome.state;
+            before = Some((std::mem::replace(&mut state, outcome.state), drag.strength));
             self.balance.drag = None;
             let free = self.balance.assess(&state);
             if !free.converged() {
-                strength *= match taken {
-                    0..=3 => 0.1,
-                    4..=6 => 0.3,
+                cautious = cautious.saturating_sub(1);
+                drag.strength *= match taken {
+                    _ if cautious > 0 => 1.0,
+                    0..=2 => 0.2,
+                    3..=4 => 0.4,
+                    5..=8 => 0.7,
                     _ => 1.0,
                 };
                 continue;
@@ -119,41 +145,39 @@ impl Solver<'_> {
                 return Ok(None);
             }
             pushes += 1;
-            let Some((pushed, enough)) = self.pushed(&state, last, &weights)? else { return Ok(None) };
-            (state, strength) = (pushed, enough);
+            let Some(pushed) = self.pushed(&state, last, &mut drag)? else { return Ok(None) };
+            (state, before) = (pushed, None);
         }
         Ok(None)
     }
 
-    /// A saddle pushed along a negative mode v of K v = m D v, and the drag that holds that mode back.
-    fn pushed(&mut self, saddle: &State, last: &State, weights: &Arc<Vec<f64>>) -> Result<Option<(State, f64)>> {
+    /// A saddle pushed along a negative mode v of K v = m D v; the drag then holds that mode back.
+    fn pushed(&mut self, saddle: &State, last: &State, drag: &mut Drag) -> Result<Option<State>> {
         let model = self.balance.model;
-        let mut strength = WEAKEST_DRAG;
+        drag.strength = WEAKEST_DRAG;
         loop {
-            self.balance.drag =
-                Some(Drag { strength, weights: weights.clone(), from: model.unknowns(saddle) });
+            self.balance.drag = Some(drag.clone());
             self.balance.inspect(saddle)?;
             if self.balance.negative_modes() == Some(0) {
                 break;
             }
-            strength *= 10.0;
-            if strength > STRONGEST_DRAG {
+            drag.strength *= 10.0;
+            if drag.strength > STRONGEST_DRAG {
                 return Ok(None);
             }
         }
-        let product = |a: &[f64], b: &[f64]| -> f64 {
-            weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum()
-        };
+        let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
         // inverse iteration v <- (K + s D)^-1 D v from a direction that no symmetry singles out
-        let mut mode: Vec<f64> = (0..weights.len()).map(|k| ((k * k + k) as f64 * 0.7 + 0.3).sin()).collect();
+        let mut mode: Vec<f64> = (0..drag.from.len()).map(|k| ((k * k + k) as f64 * 0.7 + 0.3).sin()).collect();
         let mut negative = false;
         for _ in 0..MODE_ITERATIONS {
-            let size = product(&mode, &mode).sqrt();
-            mode.iter_mut().for_each(|v| *v /= size);
-            let mut next: Vec<f64> = mode.iter().zip(weights.iter()).map(|(v, w)| v * w).collect();
+            let mut next = drag.times(&mode);
+            let size = product(&mode, &next).sqrt();
+            next.iter_mut().chain(&mut mode).for_each(|v| *v /= size);
+            let right = next.clone();
             self.balance.solve_factored(&mut next)?;
-            // of (K + s D)^-1 D; s is more than the mode's own value
-            let value = 1.0 / product(&mode, &next) - strength;
+            // m + s of K v = m D v, from <v, D (K + s D)^-1 D v>
+            let value = 1.0 / product(&right, &next) - drag.strength;
             mode = next;
             if negative {
                 break;
@@ -163,23 +187,24 @@ impl Solver<'_> {
         if !negative {
             return Ok(None);
         }
-        let displacement = |(v, w): (&f64, &f64)| if *w > 0.0 { *v } else { 0.0 };
-        let mut push: Vec<f64> = mode.iter().zip(weights.iter()).map(displacement).collect();
-        let largest = push.iter().copied().fold(0.0, |most: f64, v| if v.abs() > most.abs() { v } else { most });
-        let back: Vec<f64> =
-            model.unknowns(last).iter().zip(model.unknowns(saddle)).map(|(to, from)| to - from).collect();
-        let towards = product(&push, &back);
-        let size = product(&push, &push).sqrt() * product(&back, &back).sqrt();
+        let push = model.displacement_of(&mode);
+        let largest = push.iter().flatten().fold(0.0, |most: f64, v| if v.abs() > most.abs() { *v } else { most });
+        // to the side from which the body came, if it did from one
+        let back: Vec<f64> = model.unknowns(last).iter().zip(&drag.from).map(|(to, from)| to - from).collect();
+        let pull = drag.times(&back);
+        let towards = product(&mode, &pull);
+        let size = product(&back, &pull).sqrt() * product(&mode, &drag.times(&mode)).sqrt();
         let sign = if towards.abs() > 1e-3 * size { towards.signum() } else { largest.signum() };
         let length = sign * PUSH * model.element_size() / largest.abs();
-        push.iter_mut().for_each(|v| *v *= length);
         self.balance.drag = None;
         let mut part = 1.0;
         while part > 1e-3 {
             let mut pushed = saddle.clone();
-            model.advance(&mut pushed, &push, part);
+            for (u, v) in pushed.u.iter_mut().flatten().zip(push.iter().flatten()) {
+                *u += part * length * v;
+            }
             if self.balance.assess(&pushed).admissible {
-                return Ok(Some((pushed, strength)));
+                return Ok(Some(pushed));
             }
             part *= 0.5;
         }

@@ -1,17 +1,13 @@
-//! What a state shows of why a path is in trouble: faces off their surface, fibres on the descending limb. And the drag
-//! that holds a body back while it is let go.
+//! What a state shows of why a path is in trouble: faces off their surface, fibres on the descending limb.
 
 use super::Model;
 use super::State;
-use crate::math::quadrature::GaussRule;
-use crate::math::tensor::{determinant, norm};
-use crate::mesh::{MaterialPoint, position_and_jacobian};
+use crate::math::tensor::norm;
+use crate::mesh::MaterialPoint;
 use crate::term::contact::law::Allows;
 
 /// Normalised stretch from which on a fibre counts as on the descending limb: where f_act turns flat towards its end.
 const DESCENDING: f64 = 1.4;
-/// Points per direction for the drag.
-const DRAG_POINTS: usize = 4;
 
 /// A point of a face that has left the surface it must stay on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -78,34 +74,5 @@ impl Model {
             found
         };
         self.muscles().filter_map(of_muscle).collect()
-    }
-
-    /// D of a drag, one entry for each unknown, mN/mm; zero for pressures:
-    ///   D_a = mu / h^2 sum w N_a^2,  lumped
-    /// so that a drag of strength one is about as strong as the tissue is stiff over one element.
-    pub fn drag(&self) -> Vec<f64> {
-        let (mesh, rule) = (self.mesh(), GaussRule::new(DRAG_POINTS));
-        let scale = self.volume_scale() / self.element_size();
-        let mut drag = vec![0.0; self.numbering.unknowns()];
-        for element in 0..mesh.elements() {
-            let local = mesh.local(element);
-            let mut mass = [0.0; 64];
-            for (xi, weight) in rule.cube() {
-                let (_, jacobian) = position_and_jacobian(mesh.element, &local, xi);
-                let weight = weight * determinant(&jacobian).abs();
-                mass.iter_mut().zip(mesh.element.values(xi)).for_each(|(m, n)| *m += weight * n * n);
-            }
-            for (a, mass) in mass.iter().enumerate().take(mesh.element.functions()) {
-                for term in mesh.map.terms(element, a) {
-                    for component in 0..3 {
-                        let unknown = self.numbering.displacement_unknown(term.global as usize, component);
-                        if let Some(unknown) = unknown {
-                            drag[unknown] += scale * term.scale * term.scale * mass;
-                        }
-                    }
-                }
-            }
-        }
-        drag
     }
 }
