@@ -53,11 +53,14 @@ pub struct Settings {
     pub step_max: f64,
     /// Shortest step.
     pub step_min: f64,
+    /// Whether a body that loses its balance on the path is let go ([`Snap`]). The answer then jumps with the controls, which
+    /// a fit cannot use.
+    pub release: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4, release: true }
     }
 }
 
@@ -70,7 +73,7 @@ pub struct Step {
     pub kind: StepKind,
     /// Newton iterations of the step.
     pub iterations: Vec<Iteration>,
-    /// Residual at the end, mN.
+    /// Residual at the end, mN; above what is required only where it is rounding, or in a failed step.
     pub residual: f64,
     /// The residual required, mN.
     pub required: f64,
@@ -431,13 +434,7 @@ impl<'m> Solver<'m> {
             return Some(Likely::OffSurface { name, element: off.at.element, position: off.position });
         }
         let most = model.descending_fibres(failed).into_iter().max_by(|a, b| a.stretch.total_cmp(&b.stretch))?;
-        Some(Likely::DescendingLimb {
-            muscle: model.terms()[most.term].name().to_owned(),
-            points: most.points,
-            of: most.of,
-            position: most.position,
-            stretch: most.stretch,
-        })
+        Some(most.told(model))
     }
 
     /// Solves K x = b with the tangent at the equilibrium `state` for several right-hand sides, one after the other in

@@ -73,8 +73,8 @@ impl Released {
 impl Solver<'_> {
     /// Lets the body go at the target: from `start`, which need not be in balance, to a stable equilibrium. A push off a
     /// saddle leads towards `last` where it can. `None` if there is no such equilibrium, or if the body snapped too often.
-    pub(super) fn release(&mut self, before: &[super::Snap], start: &State, last: &State) -> Option<Released> {
-        if before.len() >= MOST_SNAPS {
+    pub(super) fn release(&mut self, before: &[Snap], start: &State, last: &State) -> Option<Released> {
+        if !self.settings.release || before.len() >= MOST_SNAPS {
             return None;
         }
         let released = self.descend(start, last);
@@ -107,11 +107,6 @@ impl Solver<'_> {
                 |(earlier, then)| self.balance.extrapolate(earlier, &state, (then / drag.strength).min(FARTHEST)),
             );
             let outcome = self.attempt(guess, &state, limits);
-            if std::env::var("TRACE").is_ok() {
-                if let Ok(outcome) = &outcome {
-                eprintln!("  s {:.1e} its {} stop {:?} modes {:?} res {:.1e} req {:.1e} last factor {:?} detF {:?}", drag.strength, outcome.iterations.len(), outcome.stop, self.balance.negative_modes(), outcome.last.residual, outcome.last.required, outcome.iterations.last().map(|i| i.factor), self.balance.worst_point().min);
-                }
-            }
             let Ok(outcome) = outcome else {
                 (drag.strength, cautious) = (3.0 * drag.strength, CAUTIOUS_STEPS);
                 continue;

@@ -2,6 +2,7 @@
 
 use super::Model;
 use super::State;
+use crate::error::Likely;
 use crate::math::tensor::norm;
 use crate::mesh::MaterialPoint;
 use crate::term::contact::law::Allows;
@@ -33,6 +34,15 @@ pub struct Descending {
     pub position: [f64; 3],
     /// Its stretch lambda = |F n0|.
     pub stretch: f64,
+}
+
+impl Descending {
+    /// As messages tell it.
+    pub fn told(&self, model: &Model) -> Likely {
+        let muscle = model.terms()[self.term].name().to_owned();
+        let Descending { points, of, position, stretch, .. } = *self;
+        Likely::DescendingLimb { muscle, points, of, position, stretch }
+    }
 }
 
 impl Model {
