@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
     ActivationSpec, BlockSpec, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec, LawSpec, LoadKind,
-    PartSpec, Scene, SupportKind, Task, Units,
+    PartSpec, Scene, SupportKind, SurfaceSpec, Task, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -520,7 +520,36 @@ law = { penalty = { kpa_per_mm = 5 } }
 face = "xi1=1"
 surface = { capsule = { from_mm = [90, 0, 10], to_mm = [90, 20, 10], radius_mm = 29.5 } }
 law = { penalty = { kpa_per_mm = 5 } }
+[[contact]]
+name = "lips"
+face = ["upper:xi3=0", "xi1=1"]
+surface = { faces = { face = "lower:xi3=1", depth_mm = 0.5 } }
+law = { penalty = { kpa_per_mm = 5 } }
+[[contact]]
+name = "fold"
+face = "boundary"
+surface = { itself = {} }
+law = { barrier = { kpa_per_mm = 5, range_mm = 0.1 } }
 "#;
+
+/// Several blocks are one host: faces of each by its name, of all without.
+#[test]
+fn blocks_are_read_locked_and_built() {
+    let blocks = "blocks = [{ name = \"lower\", origin_mm = [0, 0, 0], size_mm = [60, 20, 9], elements = [6, 2, 1] }, \
+                  { name = \"upper\", origin_mm = [0, 0, 10], size_mm = [60, 20, 10], elements = [3, 2, 1] }]";
+    let line = WHOLE.lines().find(|line| line.starts_with("block = ")).expect("the host");
+    let text = WHOLE.replacen(line, blocks, 1).replace("\"xi1=0\"", "\"upper:xi1=0\"");
+    let scene = parse(&text, &[]).unwrap();
+    let GeometrySpec::Blocks(all) = &scene.mesh.geometry else { panic!("{:?}", scene.mesh.geometry) };
+    assert_eq!((all[1].name.as_str(), all[1].block.elements), ("upper", [3, 2, 1]));
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!(content(&scene), content(&again));
+    let mesh = risorius::model::build::host(&scene.mesh).unwrap();
+    assert_eq!((mesh.elements(), mesh.nodes), (18, 42 + 24));
+    let count = |name: &str| mesh.named_faces[name].len();
+    assert_eq!((count("upper:xi1=0"), count("lower:xi1=0"), count("xi1=0")), (2, 2, 4));
+    assert_eq!(risorius::mesh::face::boundary_faces(&mesh).len(), 2 * (12 + 6 + 2) + 2 * (6 + 3 + 2));
+}
 
 #[test]
 fn contacts_are_read_and_locked() {
@@ -528,7 +557,10 @@ fn contacts_are_read_and_locked() {
     let scene = parse(&text, &[]).unwrap();
     let names = |list: &[risorius::scene::ContactSpec]| list.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&scene.slidings), ["sliding-1", "pole"]);
-    assert_eq!(names(&scene.contacts), ["contact-1", "contact-2", "contact-3"]);
+    assert_eq!(names(&scene.contacts), ["contact-1", "contact-2", "contact-3", "lips", "fold"]);
+    let other = FaceSpec(vec![FaceName::OfBlock { block: "lower".into(), direction: 2, end: 1 }]);
+    assert!(matches!(&scene.contacts[3].surface, SurfaceSpec::Faces { face, depth_mm: Some(0.5) } if *face == other));
+    assert!(matches!(&scene.contacts[4].surface, SurfaceSpec::Itself { depth_mm: None }));
     assert_eq!((scene.contacts[0].gauss, scene.contacts[1].gauss), (7, 5));
     let again = parse(&scene.lock(), &[]).unwrap();
     assert_eq!(content(&scene), content(&again));

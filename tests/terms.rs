@@ -90,11 +90,11 @@ fn cases() -> Vec<(String, Model)> {
             Box::new(Contact::new("contact", interface, mesh, faces, 3))
         });
     }
-    for (name, allows, law, relax) in mutual_contacts() {
+    for (name, law, relax) in mutual_contacts() {
         // a barrier stays before the other body
         let mesh = facing(if law.range() > 0.0 { 6.0 } else { 0.0 });
         let between = Between::Two(mesh.named_faces["lower:xi3=1"].clone(), mesh.named_faces["upper:xi3=0"].clone());
-        let manner = Manner { allows, law, relax, depth: Some(4.0) };
+        let manner = Manner { law, relax, depth: Some(4.0) };
         let term: Box<dyn Term> = Box::new(Mutual::new("lips", manner, &mesh, between, 3));
         all.push((name.to_owned(), model(mesh, &pressure::Trilinear, vec![term], Vec::new())));
     }
@@ -124,31 +124,26 @@ fn whole_surface(mesh: &Mesh) -> Vec<risorius::mesh::face::Face> {
 
 /// Two curved bodies that face each other, of which the upper one is wider.
 fn facing(apart: f64) -> Mesh {
-    let lower = curved_block(&TricubicHermite, [2, 1, 1], 0.03, 23);
-    let mut upper = curved_block(&TricubicHermite, [2, 2, 1], 0.03, 24);
+    let lower = curved_block(&TricubicHermite, [2, 1, 1], 0.03, 29);
+    let mut upper = curved_block(&TricubicHermite, [2, 2, 1], 0.03, 29);
     for (k, x) in upper.parameters.iter_mut().enumerate() {
         if k % 8 == 0 {
             *x = [x[0] - 1.0, x[1] - 4.0, x[2] + 9.9 + apart];
         }
     }
-    join(&[("lower", lower), ("upper", upper)])
+    join(&[("lower".into(), lower), ("upper".into(), upper)])
 }
 
-type MutualCase = (&'static str, Allows, Box<dyn ContactLaw>, bool);
+type MutualCase = (&'static str, Box<dyn ContactLaw>, bool);
 
 fn mutual_contacts() -> Vec<MutualCase> {
     let penalty = || Box::new(Penalty { stiffness: 2.0 });
     let augmented = || Box::new(Augmented { stiffness: 2.0, tolerance: 1e-6 });
     vec![
-        ("contact of two bodies, penalty", Allows::ClosedOrOpen, penalty(), false),
-        ("contact of two bodies, augmented", Allows::ClosedOrOpen, augmented(), false),
-        ("contact of two bodies, penalty, relaxing", Allows::ClosedOrOpen, penalty(), true),
-        (
-            "contact of two bodies, barrier",
-            Allows::ClosedOrOpen,
-            Box::new(Barrier { stiffness: 2.0, range: 9.0 }),
-            false,
-        ),
+        ("contact of two bodies, penalty", penalty(), false),
+        ("contact of two bodies, penalty, relaxing", penalty(), true),
+        ("contact of two bodies, augmented", augmented(), false),
+        ("contact of two bodies, barrier", Box::new(Barrier { stiffness: 2.0, range: 9.0 }), false),
     ]
 }
 
@@ -256,6 +251,11 @@ fn slope(f: impl Fn(f64) -> Vec<f64>, h: f64) -> Vec<f64> {
     (0..a.len()).map(|k| (8.0 * (c[k] - b[k]) - (d[k] - a[k])) / (12.0 * h)).collect()
 }
 
+/// Small where points open and close, so that few of them do within it.
+fn step_for(name: &str) -> f64 {
+    if name.starts_with("contact of two") { 1e-4 } else { 1e-3 }
+}
+
 #[test]
 fn forces_are_slopes_of_the_energy() {
     for (name, model) in cases() {
@@ -264,7 +264,7 @@ fn forces_are_slopes_of_the_energy() {
         assert!(common::largest(&residual) > 0.0, "{name}: no force to test");
         for v in directions(&model, 32) {
             let power: f64 = residual.iter().zip(&v).map(|(r, v)| r * v).sum();
-            let found = slope(|h| vec![energy(&model, &moved(&model, &state, &v, h))], 1e-3)[0];
+            let found = slope(|h| vec![energy(&model, &moved(&model, &state, &v, h))], step_for(&name))[0];
             // a sum of forces of both signs is measured against their size
             let size: f64 = residual.iter().zip(&v).map(|(r, v)| (r * v).powi(2)).sum::<f64>().sqrt();
             assert!((power - found).abs() <= 1e-8 * size, "{name}: {power} instead of {found}");
@@ -279,7 +279,7 @@ fn stiffness_is_the_slope_of_the_forces() {
         let is_dead = model.terms().iter().all(|t| t.is_load() && t.name() != "pressure");
         for v in directions(&model, 34) {
             let ours = tangent_times(&model, &state, &v);
-            let differences = slope(|h| evaluate(&model, &moved(&model, &state, &v, h)).residual, 1e-3);
+            let differences = slope(|h| evaluate(&model, &moved(&model, &state, &v, h)).residual, step_for(&name));
             if is_dead {
                 assert!(
                     ours.iter().chain(&differences).all(|k| k.abs() < 1e-9),
@@ -313,7 +313,8 @@ fn controls_and_loads_have_their_forces() {
                 assert!(by_control.iter().chain(&found).all(|f| *f == 0.0), "{name}: depends on a control");
             }
         }
-        let (by_load, found_load) = (model.load_force(&state), slope(loads, 0.1));
+        let (by_load, found_load) =
+            (model.load_force(&state), slope(loads, if name.starts_with("contact of two") { 1e-4 } else { 0.1 }));
         if name.ends_with("relaxing") {
             assert!(common::largest(&by_load) > 0.0, "{name}: the load relaxes it");
             assert_close(&name, &by_load, &found_load, 1e-10);
@@ -328,13 +329,16 @@ fn controls_and_loads_have_their_forces() {
     }
 }
 
-/// x -> R x + t leaves the energies of tissue, muscle and enclosed pressure alone and turns their forces.
+/// x -> R x + t leaves the energies of tissue, muscle, enclosed pressure and contact of two bodies alone and turns their
+/// forces.
 #[test]
 fn rigid_motion_costs_nothing() {
     let mut random = Random::new(36);
-    let own = |model: &Model| model.contacts().next().is_none();
-    let free = |name: &str| name.starts_with("tissue") || name.starts_with("muscle") || name == "pressure";
-    for (name, model) in cases().into_iter().filter(|(name, model)| free(name) && own(model)) {
+    let free = |name: &str| {
+        let both = name.starts_with("contact of two") && !name.ends_with("relaxing");
+        name.starts_with("tissue") || name.starts_with("muscle") || name == "pressure" || both
+    };
+    for (name, model) in cases().into_iter().filter(|(name, _)| free(name)) {
         let state = random_state(&model, 37);
         let (turn, shift) = (random.rotation(), random.triple().map(|t| 10.0 * t));
         let mut turned = state.clone();

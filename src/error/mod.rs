@@ -504,6 +504,16 @@ pub enum Error {
         /// The contact in the problem file.
         place: Box<Place>,
     },
+    /// A face is on both sides of a contact.
+    #[error("`{contact}`: a face of element {element} is on both sides of the contact")]
+    MeetsItself {
+        /// The contact.
+        contact: Box<str>,
+        /// The element of the host.
+        element: usize,
+        /// The contact in the problem file.
+        place: Box<Place>,
+    },
     /// A line of an EX file is not what the format asks for.
     #[error("the EX file cannot be read: this should be {expected}")]
     ExSyntax {
@@ -756,6 +766,7 @@ impl Error {
             Error::PointOutside { .. } => "G020",
             Error::BadRegion { .. } => "G021",
             Error::StartsInContact { .. } => "G022",
+            Error::MeetsItself { .. } => "G024",
             Error::ExSyntax { .. } => "G008",
             Error::ExUnsupported { .. } => "G009",
             Error::ExField { .. } => "G010",
@@ -803,6 +814,7 @@ impl Error {
             | Error::PointOutside { place, .. }
             | Error::BadRegion { place, .. }
             | Error::StartsInContact { place, .. }
+            | Error::MeetsItself { place, .. }
             | Error::ExSyntax { place, .. }
             | Error::ExUnsupported { place, .. }
             | Error::ExField { place, .. }

@@ -87,6 +87,11 @@ impl Error {
                  start in front of its surface)"
                     .into(),
             ),
+            Error::MeetsItself { .. } => Some(
+                "name different faces in `face` and in `surface`; a set of faces that may touch itself is written \
+                 surface = { itself = {} }"
+                    .into(),
+            ),
             Error::ExSyntax { .. } => Some(
                 "EX files of versions 1, 2 and 3 are read; of version 1, put the nodes and the elements into one file".into(),
             ),

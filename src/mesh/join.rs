@@ -9,7 +9,7 @@ use super::map::{ElementMap, Term};
 ///
 /// # Panics
 /// Without parts, or where their elements differ.
-pub fn join(parts: &[(&str, Mesh)]) -> Mesh {
+pub fn join(parts: &[(String, Mesh)]) -> Mesh {
     let element = parts[0].1.element;
     let mut locals = Vec::new();
     let mut whole = Mesh::new(element, Vec::new(), Vec::new());

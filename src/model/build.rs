@@ -7,19 +7,21 @@ use crate::error::{Error, MuscleOutside, Place, Result, Warning};
 use crate::material::fibre::Blemker;
 use crate::math::tensor::{norm, normalised};
 use crate::mesh::block::block;
-use crate::mesh::element::{TricubicHermite, Trilinear};
+use crate::mesh::element::{Element, TricubicHermite, Trilinear};
 use crate::mesh::exf::{ExFile, Geometry};
 use crate::mesh::face::{Face, boundary_faces};
 use crate::mesh::fibre_angles::FibreAngles;
+use crate::mesh::join::join;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
     ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceName, FaceSpec,
-    FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, PressureSpec, Scene, SupportKind,
-    SurfaceSpec,
+    FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec, PressureSpec, Scene,
+    SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
 use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use crate::term::contact::mutual::{Between, Manner, Mutual};
 use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use crate::term::contact::{Contact, Interface};
 use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
@@ -90,7 +92,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     for (spec, allows) in slidings.chain(scene.contacts.iter().map(|spec| (spec, Allows::ClosedOrOpen))) {
         match contact(scene, spec, allows, &mesh) {
             Ok((contact, warning)) => {
-                terms.push(Box::new(contact));
+                terms.push(contact);
                 warnings.extend(warning);
             }
             Err(error) => mistakes.push(error),
@@ -167,6 +169,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
 pub fn host(spec: &MeshSpec) -> Result<Mesh> {
     match &spec.geometry {
         GeometrySpec::Block(spec) => Ok(block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)),
+        GeometrySpec::Blocks(all) => Ok(blocks(&TricubicHermite, all)),
         GeometrySpec::Exf(exf) => {
             let Geometry { mesh, field, .. } = ExFile::read(&exf.path)?.geometry(exf.field.as_deref())?;
             if mesh.element.parameters_per_node() == 8 {
@@ -175,6 +178,15 @@ pub fn host(spec: &MeshSpec) -> Result<Mesh> {
             Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
         }
     }
+}
+
+/// Several boxes as one mesh.
+fn blocks(element: &'static dyn Element, all: &[NamedBlockSpec]) -> Mesh {
+    let part = |NamedBlockSpec { name, block: spec }: &'_ NamedBlockSpec| {
+        (name.clone(), block(element, spec.origin_mm, spec.size_mm, spec.elements))
+    };
+    let parts: Vec<(String, Mesh)> = all.iter().map(part).collect();
+    join(&parts)
 }
 
 /// The faces with any of the names, each once, in order.
@@ -188,6 +200,10 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
         if named.is_empty() {
             let named = match scene.mesh.geometry {
                 GeometrySpec::Block(_) => "the faces of a block are xi1=0 to xi3=1, and boundary for all of them",
+                GeometrySpec::Blocks(_) => {
+                    "the faces of a block with the name lip are lip:xi1=0 to lip:xi3=1; xi1=0 are those of all blocks, and \
+                     boundary is the whole surface"
+                }
                 GeometrySpec::Exf(_) => {
                     "boundary is all of it, 7:xi1=0 a single face of element 7, xi1=0 all faces on that side of their \
                      element; faces between two elements are not on the boundary"
@@ -207,6 +223,7 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
 fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles)> {
     let (mesh, file) = match &spec.geometry {
         GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
+        GeometrySpec::Blocks(all) => (blocks(&Trilinear, all), None),
         GeometrySpec::Exf(exf) => {
             let file = ExFile::read(&exf.path)?;
             let geometry = file.geometry(exf.field.as_deref())?;
@@ -285,9 +302,50 @@ fn embed(scene: &Scene, spec: &MuscleSpec, locator: &Locator<'_>, first: usize) 
 /// A reference shape that violates a contact by less is taken as rounding, mm.
 const START_TOLERANCE: f64 = 1e-6;
 
-fn contact(scene: &Scene, spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Result<(Contact, Option<Warning>)> {
+fn contact(
+    scene: &Scene,
+    spec: &ContactSpec,
+    allows: Allows,
+    mesh: &Mesh,
+) -> Result<(Box<dyn Term>, Option<Warning>)> {
+    let own = faces(scene, mesh, &spec.face, &spec.place)?;
+    let (between, depth) = match &spec.surface {
+        SurfaceSpec::Faces { face, depth_mm } => {
+            let others = faces(scene, mesh, face, &spec.place)?;
+            if let Some(both) = others.iter().find(|face| own.contains(face)) {
+                let (contact, element) = (spec.name.as_str().into(), both.element);
+                return Err(Error::MeetsItself { contact, element, place: Box::new(spec.place.clone()) });
+            }
+            (Between::Two(own, others), *depth_mm)
+        }
+        SurfaceSpec::Itself { depth_mm } => (Between::Itself(own), *depth_mm),
+        _ => return rigid_contact(spec, allows, mesh, &own),
+    };
+    let manner = Manner { law: contact_law(&spec.law), relax: spec.initial == InitialSpec::Relax, depth };
+    let contact = Mutual::new(&spec.name, manner, mesh, between, spec.gauss);
+    let warning = start_of_contact(spec, allows, contact.worst_start(mesh))?;
+    Ok((Box::new(contact), warning))
+}
+
+fn contact_law(law: &ContactLawSpec) -> Box<dyn ContactLaw> {
+    match *law {
+        ContactLawSpec::Penalty { kpa_per_mm } => Box::new(Penalty { stiffness: kpa_per_mm }),
+        ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
+            Box::new(Augmented { stiffness: kpa_per_mm, tolerance: gap_mm })
+        }
+        ContactLawSpec::Barrier { kpa_per_mm, range_mm } => {
+            Box::new(Barrier { stiffness: kpa_per_mm, range: range_mm })
+        }
+    }
+}
+
+fn rigid_contact(
+    spec: &ContactSpec,
+    allows: Allows,
+    mesh: &Mesh,
+    faces: &[Face],
+) -> Result<(Box<dyn Term>, Option<Warning>)> {
     let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
-    let faces = faces(scene, mesh, &spec.face, &spec.place)?;
     let surface: Box<dyn RigidSurface> = match spec.surface {
         SurfaceSpec::Plane { through_mm, normal } => {
             Box::new(Plane { through: through_mm, normal: normalised(normal) })
@@ -301,29 +359,33 @@ fn contact(scene: &Scene, spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Re
         SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
             Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
         }
-        SurfaceSpec::Reference => Box::new(Patches::new(mesh, &faces, FreeSide::Inside)),
-    };
-    let law: Box<dyn ContactLaw> = match spec.law {
-        ContactLawSpec::Penalty { kpa_per_mm } => Box::new(Penalty { stiffness: kpa_per_mm }),
-        ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
-            Box::new(Augmented { stiffness: kpa_per_mm, tolerance: gap_mm })
-        }
-        ContactLawSpec::Barrier { kpa_per_mm, range_mm } => {
-            Box::new(Barrier { stiffness: kpa_per_mm, range: range_mm })
+        SurfaceSpec::Reference | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
+            Box::new(Patches::new(mesh, faces, FreeSide::Inside))
         }
     };
     let relax = spec.initial == InitialSpec::Relax;
-    let contact = Contact::new(&spec.name, Interface { allows, surface, law, relax }, mesh, &faces, spec.gauss);
-    let Some((at, position, gap)) = contact.worst_start(mesh) else { return Ok((contact, None)) };
-    let barrier = matches!(spec.law, ContactLawSpec::Barrier { .. });
+    let interface = Interface { allows, surface, law: contact_law(&spec.law), relax };
+    let contact = Contact::new(&spec.name, interface, mesh, faces, spec.gauss);
+    let warning = start_of_contact(spec, allows, contact.worst_start(mesh))?;
+    Ok((Box::new(contact), warning))
+}
+
+/// A mistake or a warning where the reference shape violates a contact; `worst` is the point that does so most.
+fn start_of_contact(
+    spec: &ContactSpec,
+    allows: Allows,
+    worst: Option<(MaterialPoint, [f64; 3], f64)>,
+) -> Result<Option<Warning>> {
+    let Some((at, position, gap)) = worst else { return Ok(None) };
     let wrong = match allows {
         Allows::Closed => gap.abs() > START_TOLERANCE,
-        Allows::ClosedOrOpen => gap < -START_TOLERANCE || (barrier && contact.smallest_start() <= 0.0),
+        Allows::ClosedOrOpen if matches!(spec.law, ContactLawSpec::Barrier { .. }) => gap <= 0.0,
+        Allows::ClosedOrOpen => gap < -START_TOLERANCE,
     };
     if !wrong {
-        return Ok((contact, None));
+        return Ok(None);
     }
-    if !relax {
+    if spec.initial == InitialSpec::Refuse {
         let (name, place) = (spec.name.as_str().into(), Box::new(spec.place.clone()));
         return Err(Error::StartsInContact { name, gap, position, element: at.element, place });
     }
@@ -337,7 +399,7 @@ fn contact(scene: &Scene, spec: &ContactSpec, allows: Allows, mesh: &Mesh) -> Re
         place: Some(spec.place.clone()),
         help: None,
     };
-    Ok((contact, Some(warning)))
+    Ok(Some(warning))
 }
 
 /// Warns where a muscle has so few quadrature points for the host's elements that the answer depends on where they fall.

@@ -115,7 +115,7 @@ impl Model {
     pub fn contacts(&self) -> impl Iterator<Item = (usize, Allows)> {
         let allows = |term: &dyn Term| match (term.as_contact(), term.as_coupling()) {
             (Some(contact), _) => Some(contact.allows()),
-            (_, Some(coupling)) => Some(coupling.allows()),
+            (_, Some(_)) => Some(Allows::ClosedOrOpen),
             _ => None,
         };
         self.terms().iter().enumerate().filter_map(move |(index, term)| Some((index, allows(term.as_ref())?)))

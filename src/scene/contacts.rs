@@ -1,7 +1,7 @@
-//! `[[sliding]]` and `[[contact]]`: a face, the surface it meets, and the law between them.
+//! `[[sliding]]` and `[[contact]]`: a face, what it meets, and the law between them.
 
 use super::cursor::{FINITE, Item, POSITIVE, Reader, Table};
-use super::interpret::face;
+use super::interpret::{face, faces};
 use super::spec::*;
 
 type Contacts = Option<Vec<ContactSpec>>;
@@ -20,16 +20,21 @@ fn numbered<'a>(file: &mut Table<'a>, kind: &'static str, laws: &[LawReader<'a>]
     let mut number = 0;
     file.tables(kind, |table| {
         number += 1;
-        contact(table, &format!("{kind}-{number}"), laws)
+        contact(table, kind, &format!("{kind}-{number}"), laws)
     })
 }
 
-fn contact<'a>(table: &mut Table<'a>, default_name: &str, laws: &[LawReader<'a>]) -> Option<ContactSpec> {
+fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[LawReader<'a>]) -> Option<ContactSpec> {
     let name = table.or("name", default_name.to_owned(), |item| item.name());
     let face = face(table);
     let surface =
         table.required("surface", "surface = { plane = { through_mm = [0, 0, 0], normal = [0, 0, 1] } }", |item| {
-            item.table(surface)
+            match item.table(surface)? {
+                SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } if kind == "sliding" => {
+                    item.out_of_range("a face that yields", "a rigid surface for sliding; [[contact]] can meet faces")
+                }
+                surface => Some(surface),
+            }
         });
     let law = table
         .required("law", "law = { penalty = { kpa_per_mm = 10 } }", |item| item.table(|table| table.one_of(laws)));
@@ -63,7 +68,19 @@ fn surface(table: &mut Table) -> Option<SurfaceSpec> {
         ("cylinder", |item| item.table(cylinder)),
         ("capsule", |item| item.table(capsule)),
         ("reference", reference),
+        ("faces", |item| item.table(other_faces)),
+        ("itself", |item| item.table(|table| Some(SurfaceSpec::Itself { depth_mm: depth(table)? }))),
     ])
+}
+
+fn other_faces(table: &mut Table) -> Option<SurfaceSpec> {
+    let face = table.required("face", "face = \"lower:xi3=1\"", faces);
+    let depth_mm = depth(table);
+    Some(SurfaceSpec::Faces { face: face?, depth_mm: depth_mm? })
+}
+
+fn depth(table: &mut Table) -> Option<Option<f64>> {
+    table.optional("depth_mm", |item| item.number(POSITIVE))
 }
 
 fn plane(table: &mut Table) -> Option<SurfaceSpec> {

@@ -115,7 +115,41 @@ fn block(table: &mut Table) -> Option<BlockSpec> {
 
 fn mesh(table: &mut Table, references: &References) -> Option<MeshSpec> {
     let example = "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
-    Some(MeshSpec { geometry: geometry(table, references, example)?, place: table.place() })
+    let blocks = table.item("blocks").map(|item| blocks(&item));
+    let geometry = match blocks {
+        None => geometry(table, references, example),
+        Some(blocks) if table.has("block") || table.has("exf") => {
+            let keys = ["block", "blocks", "exf"];
+            keys.iter().for_each(|key| drop(table.item(key)));
+            let found: Vec<&str> = keys.into_iter().filter(|key| table.has(key)).collect();
+            drop(blocks);
+            table.not_exactly_one(&keys, &found)
+        }
+        Some(blocks) => blocks.map(GeometrySpec::Blocks),
+    };
+    Some(MeshSpec { geometry: geometry?, place: table.place() })
+}
+
+/// Boxes with names of their own.
+fn blocks(item: &Item) -> Option<Vec<NamedBlockSpec>> {
+    let mut names: Vec<String> = Vec::new();
+    let blocks = item.list("a list of blocks", |entry| {
+        entry.table(|table| {
+            let name = table.required("name", "name = \"lower\"", |item| {
+                let name = item.name()?;
+                // the names of faces are made of it
+                if name.contains(':') || name.parse::<i64>().is_ok() || names.contains(&name) {
+                    let written = format!("{name:?}");
+                    return item.out_of_range(&written, "a name of its own, without `:` and not a number");
+                }
+                names.push(name.clone());
+                Some(name)
+            });
+            let block = block(table);
+            Some(NamedBlockSpec { name: name?, block: block? })
+        })
+    })?;
+    if blocks.is_empty() { item.wrong_length("no entry", "at least one block") } else { Some(blocks) }
 }
 
 /// `block`, or `exf` with `field`.
@@ -325,28 +359,36 @@ fn rotate(table: &mut Table) -> Option<SupportKind> {
 
 /// A name of faces, or a list of names.
 pub(super) fn face(table: &mut Table) -> Option<FaceSpec> {
-    table.required("face", "face = \"xi1=0\"", |item| match item.node.value {
+    table.required("face", "face = \"xi1=0\"", faces)
+}
+
+/// The name of a face, or a list of them.
+pub(super) fn faces(item: Item) -> Option<FaceSpec> {
+    match item.node.value {
         Value::List(_) => match item.list("a list of faces", |entry| face_name(&entry))? {
             names if names.is_empty() => item.wrong_length("no entry", "the name of at least one face"),
             names => Some(FaceSpec(names)),
         },
         _ => face_name(&item).map(|name| FaceSpec(vec![name])),
-    })
+    }
 }
 
-/// `"boundary"`, `"xi1=0"` to `"xi3=1"`, or with the number of an element `"7:xi1=0"`.
+/// `"boundary"`, `"xi1=0"` to `"xi3=1"`, or with the number of an element `"7:xi1=0"` or the name of a block.
 fn face_name(item: &Item) -> Option<FaceName> {
     let sides = [0, 1, 2].iter().flat_map(|&direction| [0, 1].map(|end| FaceName::Side { direction, end }));
     let names: Vec<(String, FaceName)> =
         sides.chain([FaceName::Boundary]).map(|name| (name.to_string(), name)).collect();
-    let words: Vec<(&str, FaceName)> = names.iter().map(|(word, name)| (word.as_str(), *name)).collect();
-    if let Some((element, side)) = item.text()?.split_once(':')
-        && let Ok(element) = element.trim().parse()
-        && let Some((_, FaceName::Side { direction, end })) = words.iter().find(|(word, _)| *word == side.trim())
+    if let Some((part, side)) = item.text()?.split_once(':')
+        && let Some((_, FaceName::Side { direction, end })) = names.iter().find(|(word, _)| *word == side.trim())
     {
-        return Some(FaceName::OfElement { element, direction: *direction, end: *end });
+        let (direction, end) = (*direction, *end);
+        return Some(match part.trim().parse() {
+            Ok(element) => FaceName::OfElement { element, direction, end },
+            Err(_) => FaceName::OfBlock { block: part.trim().to_owned(), direction, end },
+        });
     }
-    item.choice(&words, &[])
+    let words: Vec<(&str, usize)> = names.iter().enumerate().map(|(k, (word, _))| (word.as_str(), k)).collect();
+    item.choice(&words, &[]).map(|k| names[k].1.clone())
 }
 
 fn load(table: &mut Table) -> Option<LoadSpec> {

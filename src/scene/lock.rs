@@ -114,6 +114,17 @@ fn geometry(geometry: &GeometrySpec) -> String {
             let (origin_mm, size_mm) = (numbers(origin_mm), numbers(size_mm));
             format!("block = {{ origin_mm = {origin_mm}, size_mm = {size_mm}, elements = {elements:?} }}")
         }
+        GeometrySpec::Blocks(blocks) => {
+            let entry =
+                |NamedBlockSpec { name, block: BlockSpec { origin_mm, size_mm, elements } }: &NamedBlockSpec| {
+                    let (origin_mm, size_mm) = (numbers(origin_mm), numbers(size_mm));
+                    format!(
+                        "{{ name = {}, origin_mm = {origin_mm}, size_mm = {size_mm}, elements = {elements:?} }}",
+                        text(name)
+                    )
+                };
+            format!("blocks = [{}]", blocks.iter().map(entry).collect::<Vec<_>>().join(", "))
+        }
         GeometrySpec::Exf(ExfSpec { path: file, field }) => {
             let field = field.as_ref().map(|field| format!("\nfield = {}", text(field))).unwrap_or_default();
             format!("exf = {}{field}", path(file))
@@ -233,7 +244,7 @@ fn contact_lines(kind: &str, contact: &ContactSpec, lines: &mut Vec<String>) {
     lines.extend([
         format!("\n[[{kind}]]"),
         format!("name = {}", text(name)),
-        format!("face = \"{face}\""),
+        format!("face = {}", faces(face)),
         format!("surface = {{ {} }}", surface_entry(surface)),
         format!("law = {{ {} }}", law_entry(law)),
         format!("initial = \"{initial}\""),
@@ -263,6 +274,14 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             round(radius_mm, inside)
         ),
         SurfaceSpec::Reference => "reference = true".into(),
+        SurfaceSpec::Faces { face, depth_mm } => {
+            let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();
+            format!("faces = {{ face = {}{depth} }}", faces(face))
+        }
+        SurfaceSpec::Itself { depth_mm } => {
+            let depth = depth_mm.map(|depth| format!(" depth_mm = {} ", number(depth))).unwrap_or_default();
+            format!("itself = {{{depth}}}")
+        }
     }
 }
 
@@ -289,12 +308,15 @@ fn load_line(kind: &LoadKind) -> String {
             numbers(acceleration_m_s2)
         ),
         LoadKind::BodyForce { mn_mm3 } => format!("body_force = {{ mn_mm3 = {} }}", numbers(mn_mm3)),
-        LoadKind::Pressure { face, kpa } => format!("pressure = {{ face = \"{face}\", kpa = {} }}", number(*kpa)),
+        LoadKind::Pressure { face, kpa } => {
+            format!("pressure = {{ face = {}, kpa = {} }}", faces(face), number(*kpa))
+        }
         LoadKind::NodalForce { position_mm, mn } => {
             format!("nodal_force = {{ position_mm = {}, mn = {} }}", numbers(position_mm), numbers(mn))
         }
         LoadKind::Spring { face, kpa_per_mm, normal_only } => format!(
-            "spring = {{ face = \"{face}\", kpa_per_mm = {}, normal_only = {normal_only} }}",
+            "spring = {{ face = {}, kpa_per_mm = {}, normal_only = {normal_only} }}",
+            faces(face),
             number(*kpa_per_mm)
         ),
     }

@@ -148,7 +148,7 @@ fn nodes(control: &Item, muscle: Option<&MuscleSpec>) -> Option<ControlValue> {
     // the nodes of a mesh in a file are counted when the model is built
     let count = muscle.and_then(|muscle| match &muscle.geometry {
         GeometrySpec::Block(block) => Some(block.nodes()),
-        GeometrySpec::Exf(_) => None,
+        GeometrySpec::Blocks(_) | GeometrySpec::Exf(_) => None,
     });
     match count {
         Some(count) if count != values.len() => control.wrong_length(

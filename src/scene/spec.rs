@@ -35,6 +35,8 @@ pub struct MeshSpec {
 pub enum GeometrySpec {
     /// A box.
     Block(BlockSpec),
+    /// Several boxes that share no node: bodies that may touch. Only of the host.
+    Blocks(Vec<NamedBlockSpec>),
     /// An EX file: `exf = "face.exf"`, and which of its fields holds the coordinates.
     Exf(ExfSpec),
 }
@@ -57,6 +59,16 @@ pub struct BlockSpec {
     pub size_mm: [f64; 3],
     /// The number of elements along each edge, at least 1.
     pub elements: [usize; 3],
+}
+
+/// One of several boxes.
+#[derive(Debug, Clone, Serialize)]
+pub struct NamedBlockSpec {
+    /// Its name, unique among the boxes; its faces are called `<name>:xi1=0`.
+    pub name: String,
+    /// The box.
+    #[serde(flatten)]
+    pub block: BlockSpec,
 }
 
 impl BlockSpec {
@@ -276,7 +288,7 @@ pub enum SupportKind {
 pub struct FaceSpec(pub Vec<FaceName>);
 
 /// How faces of the host are named.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaceName {
     /// `"boundary"`: the whole surface.
@@ -287,6 +299,15 @@ pub enum FaceName {
         /// 0, 1, 2 for xi1, xi2, xi3.
         direction: usize,
         /// 0 or 1: where that coordinate is smallest or greatest.
+        end: usize,
+    },
+    /// `"lip:xi1=0"`: a side of one of several blocks.
+    OfBlock {
+        /// The name of the block.
+        block: String,
+        /// 0, 1, 2 for xi1, xi2, xi3.
+        direction: usize,
+        /// 0 or 1.
         end: usize,
     },
     /// `"7:xi1=0"`: one face of a mesh from an EX file.
@@ -305,6 +326,7 @@ impl std::fmt::Display for FaceName {
         match self {
             FaceName::Boundary => write!(out, "boundary"),
             FaceName::Side { direction, end } => write!(out, "xi{}={end}", direction + 1),
+            FaceName::OfBlock { block, direction, end } => write!(out, "{block}:xi{}={end}", direction + 1),
             FaceName::OfElement { element, direction, end } => write!(out, "{element}:xi{}={end}", direction + 1),
         }
     }
@@ -317,7 +339,7 @@ impl std::fmt::Display for FaceSpec {
     }
 }
 
-/// Contact of a face with a rigid surface, without friction: `[[sliding]]` or `[[contact]]`.
+/// Contact of a face with a surface, without friction: `[[sliding]]` or `[[contact]]`.
 #[derive(Debug, Clone, Serialize)]
 pub struct ContactSpec {
     /// Its name in tables, unique; by default its kind and number.
@@ -337,8 +359,8 @@ pub struct ContactSpec {
     pub place: Place,
 }
 
-/// A rigid surface: `surface` of a contact.
-#[derive(Debug, Clone, Copy, Serialize)]
+/// What a face meets: `surface` of a contact.
+#[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceSpec {
     /// A plane.
@@ -381,6 +403,18 @@ pub enum SurfaceSpec {
     },
     /// The face itself, where it was before anything moved; the body is on its own side of it.
     Reference,
+    /// Other faces of the host, which yield; not for sliding.
+    Faces {
+        /// The faces.
+        face: FaceSpec,
+        /// Penetration that still counts as contact, mm; `None`: half of the thickness of the elements.
+        depth_mm: Option<f64>,
+    },
+    /// The face itself as it is: folds that touch; not for sliding.
+    Itself {
+        /// Penetration that still counts as contact, mm; `None`: half of the thickness of the elements.
+        depth_mm: Option<f64>,
+    },
 }
 
 /// A law of contact: `law` of a contact.

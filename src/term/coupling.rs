@@ -9,7 +9,6 @@ use crate::mesh::face::Face;
 
 use super::Want;
 use super::contact::ContactPoint;
-use super::contact::law::Allows;
 
 /// What a coupling is told about the body.
 #[derive(Debug, Clone, Copy)]
@@ -47,9 +46,6 @@ pub struct Coupled {
 
 /// An effect between faces of the host.
 pub trait Coupling: Send + Sync {
-    /// Whether the faces may part.
-    fn allows(&self) -> Allows;
-
     /// Quadrature points: a count of work.
     fn points(&self) -> usize;
 

@@ -4,6 +4,7 @@ mod activation_field;
 mod bars_and_springs;
 mod cardiac_beam;
 mod contact_closed_forms;
+mod contact_of_two_bodies;
 mod contact_sensitivities;
 mod cooks_membrane;
 mod cylinder_inflation;

@@ -107,16 +107,16 @@ impl Contact {
         Contact { name: name.to_owned(), interface, points, of_element }
     }
 
-    /// The point where the reference shape violates the contact most, with its position (mm) and gap (mm).
+    /// The point where the reference shape violates the contact most, or comes nearest to it, with its position (mm) and gap
+    /// (mm).
     pub fn worst_start(&self, mesh: &Mesh) -> Option<(MaterialPoint, Vector, f64)> {
-        let violated = |p: &&Point| p.start.map_or(0.0, |gap| violation(self.interface.allows, gap).abs());
-        let worst = self.points.iter().max_by(|a, b| violated(a).total_cmp(&violated(b)))?;
+        let room = |p: &Point| match (p.start, self.interface.allows) {
+            (None, _) => f64::INFINITY,
+            (Some(gap), Allows::Closed) => -gap.abs(),
+            (Some(gap), Allows::ClosedOrOpen) => gap,
+        };
+        let worst = self.points.iter().min_by(|a, b| room(a).total_cmp(&room(b)))?;
         Some((worst.at, mesh.position(worst.at), worst.start?))
-    }
-
-    /// The smallest gap of the reference shape, mm.
-    pub fn smallest_start(&self) -> f64 {
-        self.points.iter().filter_map(|p| p.start).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether the body may lift off.

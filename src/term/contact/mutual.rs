@@ -11,9 +11,9 @@
 //! Both faces are asked in turn, each for half of the energy, so that neither is preferred (two half passes, Sauer and De
 //! Lorenzis 2015):  Pi = sum over points w/2 psi(g). In contact with itself both sides of a fold are points of the set.
 
+use super::ContactPoint;
 use super::law::{Allows, ContactLaw, Response};
 use super::patch::{Jet, Patch};
-use super::{ContactPoint, violation};
 use crate::math::quadrature::GaussRule;
 use crate::math::tensor::{Vector, dot, norm, subtract};
 use crate::mesh::face::Face;
@@ -36,8 +36,6 @@ pub enum Between {
 
 /// How they meet.
 pub struct Manner {
-    /// Whether they may part.
-    pub allows: Allows,
     /// What keeps the gap.
     pub law: Box<dyn ContactLaw>,
     /// Whether what the reference shape violates is taken away in proportion to the load factor.
@@ -76,7 +74,7 @@ struct Point {
     area: f64,
     /// Gap in the reference shape, mm.
     start: Option<f64>,
-    /// What of it the load factor takes away, mm; zero or less unless the faces may not part.
+    /// What of it the load factor takes away, mm; zero or less.
     relaxed: f64,
 }
 
@@ -145,7 +143,7 @@ impl Mutual {
             let point = &mut contact.points[index];
             point.start = Some(foot.gap);
             if contact.manner.relax {
-                point.relaxed = violation(contact.manner.allows, foot.gap);
+                point.relaxed = foot.gap.min(0.0);
             }
             near.push([contact.faces[point.face], contact.faces[foot.face]]);
         }
@@ -169,17 +167,13 @@ impl Mutual {
         self.faces.iter().enumerate().flat_map(of_face).collect()
     }
 
-    /// The point where the reference shape violates the contact most, with its position (mm) and gap (mm).
+    /// The point with the smallest gap in the reference shape, with its position (mm) and gap (mm); `None` where no faces are
+    /// near each other.
     pub fn worst_start(&self, mesh: &Mesh) -> Option<(MaterialPoint, Vector, f64)> {
-        let violated = |p: &&Point| p.start.map_or(0.0, |gap| violation(self.manner.allows, gap).abs());
-        let worst = self.points.iter().max_by(|a, b| violated(a).total_cmp(&violated(b)))?;
+        let start = |p: &Point| p.start.unwrap_or(f64::INFINITY);
+        let worst = self.points.iter().min_by(|a, b| start(a).total_cmp(&start(b)))?;
         let at = self.material(worst);
         Some((at, mesh.position(at), worst.start?))
-    }
-
-    /// The smallest gap of the reference shape, mm.
-    pub fn smallest_start(&self) -> f64 {
-        self.points.iter().filter_map(|p| p.start).fold(f64::INFINITY, f64::min)
     }
 
     fn material(&self, point: &Point) -> MaterialPoint {
@@ -247,7 +241,7 @@ impl Mutual {
     fn response(&self, index: usize, gap: f64, body: &BodyState<'_>) -> Response {
         let gap = gap - (1.0 - body.load) * self.points[index].relaxed;
         let multiplier = body.multipliers.get(index).copied().unwrap_or(0.0);
-        self.manner.law.response(gap, self.manner.allows, multiplier)
+        self.manner.law.response(gap, Allows::ClosedOrOpen, multiplier)
     }
 
     /// Calls `f` for every point that has a face opposite, with its index and foot.
@@ -348,10 +342,6 @@ fn sizes(mesh: &Mesh, faces: &[Face]) -> (f64, f64) {
 }
 
 impl Coupling for Mutual {
-    fn allows(&self) -> Allows {
-        self.manner.allows
-    }
-
     fn points(&self) -> usize {
         self.points.len()
     }
@@ -366,9 +356,8 @@ impl Coupling for Mutual {
         for (index, opposite) in self.opposites(body).iter().enumerate() {
             let foot = match opposite {
                 Opposite::Foot(foot) => foot,
-                // a sliding face that has lost the other one, and faces that have passed through each other
-                Opposite::Nothing if self.manner.allows == Allows::ClosedOrOpen => continue,
-                Opposite::Nothing | Opposite::Through => {
+                Opposite::Nothing => continue,
+                Opposite::Through => {
                     energy = f64::NAN;
                     continue;
                 }
