@@ -38,6 +38,9 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
     for (term, points) in model.terms().iter().zip(model.points()) {
         text += &format!("  {:<20} {points:>8}\n", term.name());
     }
+    let effects = scene.effects();
+    let off: Vec<&str> = effects.iter().filter(|(_, count)| *count == 0).map(|(effect, _)| *effect).collect();
+    text += &format!("effects off: {}\n", off.join(", "));
     text += &format!(
         "one Newton iteration: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
         model.factor_flops() / 1e6,

@@ -43,7 +43,7 @@ pub(super) struct Balance<'m> {
     lifted_gap: Option<Vec<[f64; 3]>>,
     lifted: Option<Vec<f64>>,
     worst: WorstPoint,
-    /// Why the state last assessed was not admissible, if a face has left its surface.
+    /// Where a face had left its surface in a state that was not admissible for that; the last since it was cleared.
     pub off_surface: Option<OffSurface>,
     /// Holds the body back while it is let go.
     pub drag: Option<Drag>,
@@ -320,8 +320,9 @@ impl Equations for Balance<'_> {
         let residual = self.norm(&evaluation.residual);
         self.residual = evaluation.residual;
         let admissible = evaluation.det_f.min > 0.0 && residual.is_finite();
-        let another_reason = !admissible && evaluation.det_f.min > 0.0;
-        self.off_surface = if another_reason { self.model.off_surface(state) } else { None };
+        if !admissible && evaluation.det_f.min > 0.0 {
+            self.off_surface = self.model.off_surface(state);
+        }
         Assessment {
             residual,
             required: self.tolerance * evaluation.magnitude + ROUNDING * self.model.force_scale(),

@@ -369,6 +369,7 @@ impl<'m> Solver<'m> {
 
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
     fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
+        self.balance.off_surface = None;
         let guess = self.balance.at_target(guess);
         let mut outcome = self.solve(guess, limits)?;
         if outcome.stop == Some(Stop::Inadmissible) {
@@ -426,7 +427,7 @@ impl<'m> Solver<'m> {
         }
     }
 
-    /// What the last trial, or else the state at which Newton's method gave up, shows of the cause.
+    /// What the trials of the last attempt, or else the state at which Newton's method gave up, show of the cause.
     fn likely(&self, failed: &State) -> Option<Likely> {
         let model = self.balance.model;
         if let Some(off) = self.balance.off_surface {

@@ -10,6 +10,7 @@
 mod contacts;
 mod cursor;
 mod curves;
+mod effects;
 mod interpret;
 mod lock;
 mod nearest;

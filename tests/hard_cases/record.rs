@@ -60,7 +60,7 @@ pub fn attempt(case: &str, solver: &mut Solver<'_>, from: &State, to: &Drive) ->
         Ok(found) => {
             assert_in_balance(case, solver.model(), &found.state);
             assert_eq!((found.state.load, &found.state.controls), (to.load, &to.controls), "{case}");
-            assert!(found.history.iter().all(|step| step.residual <= step.required), "{case}");
+            assert!(found.history.iter().all(|step| step.kind != StepKind::Failed), "{case}");
             let snapped = found.history.iter().filter(|step| step.kind == StepKind::Snapped);
             assert!(snapped.map(|step| step.place).eq(found.snaps.iter().map(|snap| snap.place)), "{case}");
         }

@@ -1,7 +1,7 @@
 //! Turned, thin and squeezed elements; volumetric terms from none to very stiff.
 
 use crate::record::{attempt, cantilever, clamped_with_pull, drive, solver, stable};
-use crate::support::{Discretisation, model, moved, side, slab_beam};
+use crate::support::{Discretisation, model, moved, side, slab_beam_of};
 use risorius::forward::Equilibrium;
 use risorius::math::tensor::{apply, rotation};
 use risorius::mesh::Mesh;
@@ -61,14 +61,15 @@ fn sag(model: &Model, found: &Equilibrium) -> f64 {
     0.25 * (at(0.0, 0.0) + at(1.0, 0.0) + at(0.0, 1.0) + at(1.0, 1.0))
 }
 
-/// A sheet of 10 x 10 x 0.1 elements, and a needle of 100 x 1 x 1: beams with E = 6 (c1 + c2), softer than a plate and
-/// stiffer than a free strip, each deflected a little and then far.
+/// A sheet of 10 x 10 x 0.1 elements, and a needle of 100 x 1 x 1: beams with E = 6 (c1 + c2), each deflected a little and
+/// then far. They are as stiff as a free strip or stiffer: the clamp holds the width, and how that fades along the beam is
+/// shorter than an element. A strip that keeps its width is 4/3 as stiff.
 #[test]
 fn thin_elements_bend_as_beams_do() {
     let young = 6.0 * 0.7;
     for (what, size, elements, stiffening) in [
-        ("sheet, aspect 100", [40.0, 10.0, 0.1], [4, 1, 1], 1.5),
-        ("needle, aspect 100", [400.0, 1.0, 1.0], [4, 1, 1], 1.5),
+        ("sheet, aspect 100", [40.0, 10.0, 0.1], [4, 1, 1], 1.3),
+        ("needle, aspect 100", [400.0, 1.0, 1.0], [4, 1, 1], 1.2),
     ] {
         let [length, width, height]: [f64; 3] = size;
         let inertia = width * height * height * height / 12.0;
@@ -79,7 +80,6 @@ fn thin_elements_bend_as_beams_do() {
         let mut solver = solver(&model);
         let little = stable(&format!("{what}, bent by 1 %"), &mut solver, &model.rest(), &drive(&[], 1.0));
         let ratio = 0.01 * length / sag(&model, &little);
-        println!("    {what}: {ratio} times as stiff as a strip");
         assert!((0.97..stiffening).contains(&ratio), "{what}: {ratio} times as stiff as a strip");
         let far = stable(&format!("{what}, bent by 100 times the force"), &mut solver, &little.state, &drive(&[], 100.0));
         assert!(sag(&model, &far) > 0.4 * length, "{what}: {}", sag(&model, &far));
@@ -139,10 +139,10 @@ fn kappa_from_nothing_to_very_stiff() {
         let found = stable(&format!("bending, kappa {kappa}"), &mut solver(&model), &model.rest(), &drive(&[], 1.0));
         // about 18 mm on fine meshes, more of this element without the term
         let tip = sag(&model, &found);
-        println!("    kappa {kappa}: sag {tip}");
         assert!((16.0..if kappa == 0.0 { 23.0 } else { 19.0 }).contains(&tip), "kappa {kappa}: {tip} mm");
-        let slab = slab_beam(Discretisation::trilinear(kappa, 4), &[("slab", [4.5, 2.0, 14.2], 0.0)]);
-        for activation in [0.01, 1.0] {
+        let slab = slab_beam_of(Discretisation::trilinear(kappa, 4), &[("slab", [4.5, 2.0, 14.2], 0.0)], [3, 1, 1]);
+        // stiff, each step is short: to an activation of 1 it is 2400 iterations
+        for activation in if kappa == 0.0 { vec![0.01, 1.0] } else { vec![0.01] } {
             let case = format!("slab at activation {activation}, kappa {kappa}");
             let ended = attempt(&case, &mut solver(&slab), &slab.rest(), &drive(&[activation], 1.0));
             match ended {
