@@ -511,6 +511,7 @@ fn a_run_tells_of_snaps_of_descending_fibres_and_of_failed_steps() {
     // held at that length instead, its fibres lose force as they lengthen
     let held = SNAPPING.replace("[[load]]\ntraction = { face = \"xi1=1\", kpa = [34.73, 0, 0] }", HELD);
     fs::write(folder.path().join("held.toml"), held).unwrap();
+    fs::write(folder.path().join("curves.csv"), "time_s,all\n0,0\n0.1,0.35\n").unwrap();
     let told = stderr(&folder, &["run", "held.toml", "--out", "held", "--color", "never"], 0);
     assert!(told.contains("warn[S008]: frame 1 at 0.100 s:") && told.contains("of muscle `all`"), "{told}");
     let points = column(&text(&folder, "held/tables/muscles.csv"), "descending_points");

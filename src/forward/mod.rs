@@ -273,7 +273,10 @@ impl<'m> Solver<'m> {
                     let error = self.not_converged(&stepper, stop, &outcome);
                     let beyond = (stepper.reached() + BEYOND_A_LIMIT).min(1.0);
                     self.balance.set_target(between(&start, to, warp.place(beyond)));
-                    if let Some(released) = self.release(&snaps, &last, &last) {
+                    // where even longer steps were not allowed, a shorter one may lead on
+                    if stepper.length() < BEYOND_A_LIMIT
+                        && let Some(released) = self.release(&snaps, &last, &last)
+                    {
                         stepper.resumed(beyond);
                         snaps.push(released.snap(beyond, 0, &last));
                         history.push(released.step(beyond));

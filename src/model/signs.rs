@@ -49,7 +49,7 @@ impl Model {
     /// The first point of a sliding that has left its surface, with edge and all.
     pub fn off_surface(&self, state: &State) -> Option<OffSurface> {
         self.contacts().filter(|(_, allows)| *allows == Allows::Closed).find_map(|(term, _)| {
-            let lost = self.contact_points(state, term).into_iter().find(|point| point.gap.is_none())?;
+            let lost = self.contact_points(state, term).into_iter().find(|point| point.gap.is_none_or(f64::is_nan))?;
             Some(OffSurface { term, at: lost.at, position: lost.position })
         })
     }
