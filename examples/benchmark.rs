@@ -105,7 +105,7 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
     let mut solver = Solver::new(&model, Default::default())?;
     let mut controls = vec![0.0; model.controls().len()];
     for control in &scene.controls {
-        let own = model.muscle_controls(&control.name);
+        let own = model.controls_of(&control.name);
         for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
             controls[*k] = value;
         }

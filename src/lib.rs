@@ -77,6 +77,7 @@ pub mod model;
 pub mod report;
 pub mod scene;
 pub mod solve;
+pub mod study;
 pub mod term;
 
 pub use error::{Error, Place, Result, Warning};

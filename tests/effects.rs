@@ -45,7 +45,7 @@ blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0, p2
 "#;
 const ACTIVATION: f64 = 0.01;
 
-const EFFECTS: [Effect; 14] = [
+const EFFECTS: [Effect; 15] = [
     Effect { name: "muscle", terms: &["slab"], idle: MUSCLE, at_work: MUSCLE },
     Effect {
         name: "region",
@@ -120,6 +120,12 @@ const EFFECTS: [Effect; 14] = [
         at_work: "",
     },
     Effect {
+        name: "bone",
+        terms: &[],
+        idle: "[[bone]]\nname = \"jaw\"\nslide = { direction = [1, 0, 0], bounds_mm = [0, 12] }",
+        at_work: "",
+    },
+    Effect {
         name: "support",
         terms: &[],
         idle: "[[support]]\nsymmetry = { face = \"xi1=0\" }",
@@ -143,7 +149,9 @@ fn names(model: &Model) -> Vec<String> {
 fn solved(model: &Model, activation: f64) -> (State, Work) {
     let mut solver = Solver::new(model, Settings::default()).expect("memory");
     let drive = Drive { controls: vec![activation; model.controls().len()], load: 1.0 };
-    let found = solver.equilibrium(&model.rest(), &drive).unwrap_or_else(|failure| panic!("{:?}: {}", names(model), failure.error));
+    let found = solver
+        .equilibrium(&model.rest(), &drive)
+        .unwrap_or_else(|failure| panic!("{:?}: {}", names(model), failure.error));
     (found.state, solver.work())
 }
 
@@ -216,7 +224,8 @@ fn check_says_what_is_on_and_off_and_cost_csv_has_a_row_for_what_is_on() {
     assert_eq!(line(&page, "  tissue").split_whitespace().last(), Some("128"));
     assert!(page.contains(" unknowns (") && page.contains("Mflop") && page.contains("MB of factor"), "{page}");
 
-    let [muscle, contact] = ["muscle", "contact"].map(|name| EFFECTS.iter().find(|e| e.name == name).expect("listed"));
+    let [muscle, contact] =
+        ["muscle", "contact"].map(|name| EFFECTS.iter().find(|e| e.name == name).expect("listed"));
     let (page, parts): (String, Vec<String>) = run("more", &format!("{}\n{}", muscle.idle, contact.idle));
     assert_eq!(parts, [&["tissue", "slab", "contact-1", "traction"][..], &SOLVER].concat());
     let off = line(&page, "effects off:");

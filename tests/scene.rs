@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ActivationSpec, BlockSpec, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec, LawSpec, LoadKind,
-    PartSpec, Scene, SupportKind, SurfaceSpec, Task, Units,
+    ActivationSpec, BlockSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec,
+    LawSpec, LoadKind, PartSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -438,7 +438,7 @@ fn laws_regions_loads_and_attachments_are_read_and_locked() {
     assert!(matches!(scene.loads[2].kind, LoadKind::BodyForce { mn_mm3: [0.0, 0.0, -0.001] }));
     assert!(matches!(scene.loads[3].kind, LoadKind::Spring { kpa_per_mm: 0.5, normal_only: false, .. }));
     assert!(matches!(scene.loads[4].kind, LoadKind::Spring { normal_only: true, .. }));
-    assert_eq!(scene.attachments[0].stiffness_mn_per_mm, 20.0);
+    assert_eq!(scene.attachments[0].tie, TieSpec::Spring { stiffness_mn_per_mm: 20.0 });
     // springs hold the body
     let without_plate = OTHERS.replace("[[support]]\nplate = { face = \"xi1=1\", offset_mm = 0.5 }\n", "");
     assert!(parse(&without_plate, &[]).unwrap().warnings.is_empty());
@@ -591,6 +591,96 @@ fn contacts_are_read_and_locked() {
     }
 }
 
+const BONES: &str = r#"
+[[bone]]
+name = "jaw"
+hinge = { axis = [0, 2, 0], through_mm = [70, 0, -5], bounds_deg = [0, 35] }
+slide = { direction = [1, 0, 0], bounds_mm = [-2, 12] }
+[[bone]]
+name = "larynx"
+slide = { direction = [0, 0, 1], bounds_mm = [-10, 10] }
+[[support]]
+clamp = { face = "xi3=0", bone = "jaw" }
+[[contact]]
+face = "xi3=1"
+surface = { plane = { through_mm = [0, 0, 21], normal = [0, 0, -1] } }
+bone = "jaw"
+law = { penalty = { kpa_per_mm = 5 } }
+[[attachment]]
+position_mm = [30, 10, 10]
+stiffness_mn_per_mm = 5
+bone = "larynx"
+[[attachment]]
+position_mm = [30, 10, 12]
+rigid = true
+"#;
+
+#[test]
+fn bones_are_read_and_locked() {
+    let text = WHOLE.to_owned() + BONES;
+    let set = ["controls.jaw.hinge=10", "controls.larynx.slide={ csv = \"curves.csv\" }"];
+    let scene = parse(&text, &set).unwrap();
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let names: Vec<String> = scene.control_ranges().into_iter().map(|range| range.name).collect();
+    assert_eq!(names, ["slab", "risorius.L", "jaw.hinge", "jaw.slide", "larynx.slide"]);
+    assert_eq!(scene.bones[0].hinge.unwrap().bounds_deg, [0.0, 35.0]);
+    assert!(scene.bones[1].hinge.is_none());
+    assert!(matches!(&scene.supports[3].kind, SupportKind::Clamp { bone: Some(bone), .. } if bone == "jaw"));
+    assert_eq!(scene.contacts[0].bone.as_deref(), Some("jaw"));
+    assert_eq!(scene.attachments[0].bone.as_deref(), Some("larynx"));
+    assert_eq!((scene.attachments[1].tie, &scene.attachments[1].bone), (TieSpec::Rigid, &None));
+    assert_eq!(scene.controls[1].value, ControlValue::Constant(10.0));
+    // muscles are sought unless bones are named
+    assert_eq!(scene.fit.as_ref().unwrap().unknowns, ["slab"]);
+    let jaw = parse(&text, &["fit.unknowns=[\"jaw.hinge\", \"slab\"]"]).unwrap();
+    assert_eq!(jaw.fit.unwrap().unknowns, ["jaw.hinge", "slab"]);
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!((content(&scene), scene.lock()), (content(&again), again.lock()));
+    let idle = parse(&text.replace("bone = \"larynx\"\n", ""), &[]).unwrap();
+    assert_eq!(idle.warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["C021"]);
+
+    let curves = "time_s,jaw.hinge,slab\n0,0,0\n1,35,1\n";
+    assert!(Curves::parse(curves, "c.csv", &scene.control_ranges()).is_ok());
+    let error = Curves::parse(&curves.replace("35", "36"), "c.csv", &scene.control_ranges()).unwrap_err();
+    assert!(error.to_string().contains("from 0.0 to 35.0 deg, the bounds of its bone"), "{error}");
+
+    for (good, bad, code, told) in [
+        ("axis = [0, 2, 0]", "axis = [0, 0, 0]", "C005", "a direction, not all 0"),
+        ("bounds_deg = [0, 35]", "bounds_deg = [5, 35]", "C005", "with 0 between them"),
+        ("bounds_deg = [0, 35]", "bounds_deg = [0, 0]", "C005", "a greater upper bound"),
+        ("bounds_deg = [0, 35]", "bounds_deg = [35]", "C007", "has 1 entries"),
+        ("bounds_deg", "bounds_mm", "C002", "did you mean `bounds_deg`?"),
+        ("slide = { direction = [0, 0, 1], bounds_mm = [-10, 10] }", "", "C003", "lacks `hinge`"),
+        ("name = \"larynx\"", "name = \"jaw\"", "C008", "a second bone is called `jaw`"),
+        ("bone = \"jaw\" }", "bone = \"jar\" }", "C009", "no bone is called `jar`"),
+        ("bone = \"jaw\"\nlaw", "bone = \"jar\"\nlaw", "C009", "did you mean `jaw`?"),
+        ("bone = \"larynx\"\n[[att", "bone = \"hyoid\"\n[[att", "C009", "bones: jaw, larynx"),
+        ("plane = { through_mm = [0, 0, 21], normal = [0, 0, -1] }", "itself = {}", "C005", "clamp them to the bone"),
+        ("rigid = true", "rigid = true\nstiffness_mn_per_mm = 5", "C011", "`stiffness_mn_per_mm`, `rigid`"),
+        ("rigid = true", "", "C011", "holds none"),
+        ("rigid = true", "rigid = false", "C005", "true, or stiffness_mn_per_mm"),
+        ("\"risorius.L\"\nblock", "\"jaw.slide\"\nblock", "C008", "a second control is called `jaw.slide`"),
+        ("risorius.L = 0.05", "jaw.hinge = 36", "C005", "= 36.0 deg is not allowed: it must be from 0.0 to 35.0 deg"),
+        ("risorius.L = 0.05", "jaw.hinge = [1, 2]", "C004", "a number"),
+        ("risorius.L = 0.05", "larynx.hinge = 1", "C009", "no control is called `larynx.hinge`"),
+        ("unknowns = [\"slab\"]", "unknowns = [\"jaw.hing\"]", "C009", "did you mean `jaw.hinge`?"),
+    ] {
+        assert!(text.contains(good), "{good}");
+        let error = parse(&text.replacen(good, bad, 1), &[]).expect_err(bad);
+        let rendered = render_error(&error, false);
+        assert!(error.mistakes().iter().any(|m| m.code() == code) && rendered.contains(told), "{bad}: {rendered}");
+    }
+    // a fit without muscles must say which bone it seeks
+    let text = text.replace("[controls]\nrisorius.L = 0.05\n", "").replace("unknowns = [\"slab\"]\n", "");
+    let start = text.find("[[muscle]]").unwrap();
+    let end = text.find("[[support]]").unwrap();
+    let alone = text[..start].to_owned() + &text[end..];
+    let error = parse(&alone, &[]).unwrap_err();
+    assert_eq!((error.code(), error.mistakes().len()), ("C003", 1), "{error}");
+    assert!(error.help().unwrap().contains("unknowns = [\"jaw.hinge\"]"));
+    assert!(parse(&alone, &["fit.unknowns=[\"jaw.hinge\"]"]).is_ok());
+}
+
 #[test]
 fn files_must_exist_and_curves_are_checked_with_the_problem() {
     let folder = tempfile::tempdir().unwrap();
@@ -623,7 +713,7 @@ fn files_must_exist_and_curves_are_checked_with_the_problem() {
 
 #[test]
 fn curves_are_linear_between_rows_and_constant_outside() {
-    let muscles = ["slab".to_string(), "risorius.L".into()];
+    let muscles = ["slab", "risorius.L"].map(ControlRange::activation);
     let curves = Curves::parse("time_s, risorius.L,slab\n0,0,1\n\n2, 0.5,0\n", "c.csv", &muscles).unwrap();
     assert_eq!(curves.at("risorius.L", 1.0), Some(0.25));
     assert_eq!((curves.at("slab", -1.0), curves.at("slab", 9.0), curves.at("x", 0.0)), (Some(1.0), Some(0.0), None));
@@ -677,7 +767,7 @@ proptest! {
         let end = (at + length).min(WHOLE.len());
         survives(&format!("{}{junk}{}", &WHOLE[..at], &WHOLE[end..]), &[&set]);
         survives(&junk, &[&format!("tissue.gauss{set}"), &junk]);
-        let _ = Curves::parse(&format!("time_s,slab\n{junk}\n{set}"), "c.csv", &["slab".into()]);
+        let _ = Curves::parse(&format!("time_s,slab\n{junk}\n{set}"), "c.csv", &[ControlRange::activation("slab")]);
     }
 
     #[test]

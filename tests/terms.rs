@@ -17,6 +17,7 @@ use risorius::mesh::map::{ElementMap, Term as MapTerm};
 use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::model::supports::{Support, Supports};
 use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace};
+use risorius::term::bone::{Bone, Hinge, Slide};
 use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
 use risorius::term::contact::mutual::{Between, Manner, Mutual};
 use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
@@ -25,8 +26,10 @@ use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, t
 use risorius::term::muscle::{Activation, Muscle};
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
 use risorius::term::spring::{Resists, Springs};
+use risorius::term::tie::RigidTies;
 use risorius::term::tissue::Tissue;
 use risorius::term::{Term, Want};
+use std::sync::Arc;
 
 const TISSUE: MooneyRivlin = MooneyRivlin { c1: 0.5, c2: 0.2 };
 const FIBRE: Blemker = Blemker { sigma_max: 300.0, lambda_star: 1.4, lambda_ofl: 1.0, p1: 0.005, p2: 6.6 };
@@ -113,9 +116,31 @@ fn cases() -> Vec<(String, Model)> {
     });
     let other = MaterialPoint { element: 0, xi: [0.0, 0.0, 0.5] };
     single("attachments", &|mesh| Box::new(Springs::attachments(mesh, &[(at, 12.0), (other, 5.0)])));
+    for (name, _, surface, ..) in contacts().into_iter().filter(|(name, ..)| {
+        ["sliding, cylinder, augmented", "sliding, reference, augmented"].contains(&name.as_str())
+    }) {
+        single(&format!("{name}, on a bone"), &|mesh| {
+            let law = Box::new(Augmented { stiffness: 2.0, tolerance: 1e-6 });
+            let interface = Interface { allows: Allows::Closed, surface: surface(mesh), law, relax: false };
+            Box::new(Contact::new("contact", interface, mesh, &mesh.named_faces["xi3=0"], 3).on(bone()))
+        });
+    }
+    single("attachments on a bone", &|mesh| {
+        Box::new(Springs::attachments(mesh, &[(at, 12.0), (other, 5.0)]).on(bone()))
+    });
+    single("rigid attachments", &|mesh| Box::new(RigidTies::new(mesh, &[at, other], None, 30.0, 1e-6)));
+    single("rigid attachments on a bone", &|mesh| {
+        Box::new(RigidTies::new(mesh, &[at, other], Some(bone()), 30.0, 1e-6))
+    });
     // a pressure has an energy where its surface is closed
     single("pressure", &|mesh| Box::new(FollowerPressure::new(mesh, &whole_surface(mesh), 0.3, 6)));
     all
+}
+
+fn bone() -> Arc<Bone> {
+    let hinge = Hinge { axis: normalised([1.0, 2.0, -0.5]), through: [40.0, 0.0, -30.0], control: 1 };
+    let slide = Slide { direction: normalised([1.0, 0.0, 3.0]), control: 0 };
+    Arc::new(Bone::new("jaw", Some(hinge), Some(slide)))
 }
 
 fn whole_surface(mesh: &Mesh) -> Vec<risorius::mesh::face::Face> {
@@ -298,7 +323,7 @@ fn controls_and_loads_have_their_forces() {
         let state = random_state(&model, 35);
         let residual = |state: State| evaluate(&model, &state).residual;
         let loads = |h: f64| residual(State { load: state.load + h, ..state.clone() });
-        // both enter linearly
+        // both enter linearly, but for the poses of bones
         for control in 0..state.controls.len() {
             let along = |h: f64| {
                 let mut state = state.clone();
@@ -309,6 +334,9 @@ fn controls_and_loads_have_their_forces() {
             if name.starts_with("muscle") {
                 assert!(common::largest(&found) > 0.0);
                 assert_close(&name, &by_control, &found, 1e-12);
+            } else if name.ends_with("on a bone") {
+                assert!(common::largest(&found) > 0.0);
+                assert_close(&name, &by_control, &found, 1e-8);
             } else {
                 assert!(by_control.iter().chain(&found).all(|f| *f == 0.0), "{name}: depends on a control");
             }

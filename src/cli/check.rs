@@ -3,13 +3,18 @@
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
 use super::terminal::print;
-use super::{Ending, Flags};
+use super::{Ending, Flags, study};
 use crate::error::{Missing, Result};
 use crate::model::Model;
-use crate::scene::Scene;
+use crate::scene::{ControlRange, Problem, Scene};
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
+    if let Some(path) = path
+        && let Problem::Study(study) = Problem::read(path, &flags.set)?
+    {
+        return study::check(&study);
+    }
     let source = Source::read(path, flags)?;
     let Prepared { built, clip, warnings } = prepare(&source)?;
     let mut page = describe(&source.scene, &built.model);
@@ -37,6 +42,13 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
     text += "effects on, with quadrature points per evaluation:\n";
     for (term, points) in model.terms().iter().zip(model.points()) {
         text += &format!("  {:<20} {points:>8}\n", term.name());
+    }
+    for bone in &scene.bones {
+        let ranges = ControlRange::of_bone(bone).into_iter();
+        let ranges = ranges.map(|ControlRange { name, kind, lower, upper }| {
+            format!("{name} from {lower} to {upper} {}", kind.unit())
+        });
+        text += &format!("  bone {:<15} {}\n", bone.name, ranges.collect::<Vec<_>>().join(", "));
     }
     let effects = scene.effects();
     let off: Vec<&str> = effects.iter().filter(|(_, count)| *count == 0).map(|(effect, _)| *effect).collect();

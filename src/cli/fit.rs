@@ -14,7 +14,7 @@ use crate::forward::Work;
 use crate::model::build::Built;
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
-use crate::scene::{FitSpec, Scene};
+use crate::scene::{ControlRange, FitSpec, Scene};
 
 /// Fits every frame, writes it, prints the page.
 pub(super) fn fit(
@@ -74,10 +74,13 @@ pub(super) fn fit(
     meter.finish();
     *work = fit.work();
     record.finish(work)?;
-    let controls: Vec<&str> = model.controls().iter().map(|c| c.name.as_str()).collect();
+    let ranges = scene.control_ranges();
+    let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
+    let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
     let summary = FitSummary {
         name: &scene.name,
         controls: &controls,
+        bones: !model.bones().is_empty(),
         frames: &fitted,
         frames_failed: tally.failed.len(),
         errors: &errors,
@@ -89,6 +92,12 @@ pub(super) fn fit(
     run.folder.write("summary.txt", &page)?;
     print(&page)?;
     Ok(tally)
+}
+
+/// The name of a control, with its unit where it has one.
+fn label(name: &str, ranges: &[ControlRange]) -> String {
+    let unit = ranges.iter().find(|range| range.name == name).map_or("", |range| range.kind.unit());
+    format!("{name} {unit}").trim_end().to_owned()
 }
 
 fn pairs<'n>(names: &'n [String], estimate: &Estimate) -> Vec<MarkerPair<'n>> {

@@ -8,18 +8,19 @@ use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
 use crate::fit::sequence::settings;
-use crate::forward::{Drive, Equilibrium, Solver, Work};
+use crate::forward::drives::drives;
+use crate::forward::{Equilibrium, Solver, Work};
 use crate::model::build::Built;
 use crate::report::summary::ForwardSummary;
-use crate::report::{FailedFrame, Frame, Probe, Record, muscle_states, probe_states};
-use crate::scene::{ControlValue, Curves, Scene};
+use crate::report::{FailedFrame, Frame, Probe, Record, bone_states, muscle_states, probe_states};
+use crate::scene::Scene;
 
 /// Solves every frame, writes it, prints the page.
 pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, work: &mut Work) -> Result<Tally> {
     let model = &built.model;
     let probes = probes(scene, built);
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, false)?;
-    let drives = drives(scene, built)?;
+    let drives = drives(scene, model)?;
     let mut solver = Solver::new(model, settings(scene))?;
     let mut meter = Meter::new(flags, drives.len());
     let mut tally = Tally::default();
@@ -75,6 +76,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
             frame: *frame,
             probes: &probe_states(&probes, model, &found.state),
             muscles: &muscle_states(model, &found.state, &found.evaluation),
+            bones: &bone_states(model, &found.state, &found.evaluation),
             tissue_energy: found.evaluation.energies[0],
             external_work: model.external_work(&found.state),
             reactions: &model.supports().rotation_reactions(model.mesh(), &found.evaluation.force, &x),
@@ -93,35 +95,4 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
 /// The probes of a scene with the places that were found for them.
 pub(super) fn probes(scene: &Scene, built: &Built) -> Vec<Probe> {
     scene.probes.iter().zip(&built.probes).map(|(spec, at)| Probe { name: spec.name.clone(), at: *at }).collect()
-}
-
-/// Time and drive of every frame: one frame where all controls are constant, else one for every time of the curves.
-fn drives(scene: &Scene, built: &Built) -> Result<Vec<(f64, Drive)>> {
-    let muscles: Vec<String> = scene.muscles.iter().map(|m| m.name.clone()).collect();
-    // muscles driven by a table: name, controls, table
-    let mut curves: Vec<(&str, &[usize], Curves)> = Vec::new();
-    let mut controls = vec![0.0; built.model.controls().len()];
-    for control in &scene.controls {
-        let own = built.model.muscle_controls(&control.name);
-        if let ControlValue::Csv(path) = &control.value {
-            curves.push((&control.name, own, Curves::read(path, &muscles)?));
-        }
-        for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
-            controls[*k] = value;
-        }
-    }
-    let mut times: Vec<f64> = curves.iter().flat_map(|(.., c)| c.times_s.iter().copied()).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup();
-    if times.is_empty() {
-        return Ok(vec![(0.0, Drive { controls, load: 1.0 })]);
-    }
-    let at = |time_s: f64| {
-        let mut controls = controls.clone();
-        for (name, own, curve) in &curves {
-            own.iter().for_each(|k| controls[*k] = curve.at(name, time_s).unwrap_or(0.0));
-        }
-        (time_s, Drive { controls, load: 1.0 })
-    };
-    Ok(times.into_iter().map(at).collect())
 }

@@ -13,6 +13,7 @@ mod prepare;
 mod problem;
 mod progress;
 mod run;
+mod study;
 mod terminal;
 
 use clap::error::{ContextKind, ContextValue};
@@ -72,6 +73,9 @@ struct Flags {
     /// Set a key of the problem, for example --set solver.step_max=0.02
     #[arg(long, global = true, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// Use the cheapest settings of accuracy.toml beside the problem whose error is at most this, for example 0.1mm
+    #[arg(long, global = true, value_name = "MM", value_parser = millimetres)]
+    accuracy: Option<f64>,
     /// Stop before the first solve
     #[arg(long, global = true)]
     dry_run: bool,
@@ -127,6 +131,14 @@ impl Flags {
                 terminal::tell(&render_warning(warning, self.colour()));
             }
         }
+    }
+}
+
+/// `0.1mm` or `0.1`.
+fn millimetres(text: &str) -> std::result::Result<f64, String> {
+    match text.trim_end_matches("mm").trim().parse() {
+        Ok(length) if length > 0.0 && f64::is_finite(length) => Ok(length),
+        _ => Err("write a length in mm, for example 0.1mm".into()),
     }
 }
 

@@ -1,8 +1,9 @@
 //! Everything that comes before the first solve: the model, the recording, and what is wrong with either.
 
-use super::problem::{Source, chosen_frames, recording_warnings};
+use super::problem::{Source, recording_warnings};
 use crate::error::{Error, Result, Warning};
 use crate::fit::placement::{Marker, check_units, place};
+use crate::fit::recording::chosen_frames;
 use crate::markers::Recording;
 use crate::model::build::{Built, build, host};
 use crate::scene::{FitSpec, Scene, Task};

@@ -1,9 +1,12 @@
 //! Where a problem comes from: a file, or the one that is built in.
 
 use super::Flags;
+use super::terminal::tell;
 use crate::error::{Error, Result, Warning};
-use crate::markers::{self, ReadOptions, Recording, read, read_bytes};
-use crate::scene::{FitSpec, FramesSpec, Scene, Units};
+use crate::fit::recording;
+use crate::markers::{self, Recording, read_bytes};
+use crate::report::study::read_choices;
+use crate::scene::{FitSpec, Scene, Units};
 use std::path::Path;
 
 /// The problem that runs without a file.
@@ -21,10 +24,14 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Reads a problem file, or the built-in problem, with the `--set` overrides.
+    /// Reads a problem file, or the built-in problem, with the `--set` overrides, before them what `--accuracy` chose.
     pub fn read(path: Option<&Path>, flags: &Flags) -> Result<Source> {
         match path {
-            Some(path) => Ok(Source { scene: Scene::read(path, &flags.set)?, built_in: false }),
+            Some(path) => {
+                let chosen = flags.accuracy.map(|target| chosen(path, target, flags)).transpose()?;
+                let set = [&chosen.unwrap_or_default()[..], &flags.set].concat();
+                Ok(Source { scene: Scene::read(path, &set)?, built_in: false })
+            }
             None => {
                 let mut scene = Scene::parse(PROBLEM, NAME, Path::new(""), &flags.set)?;
                 "beam".clone_into(&mut scene.name);
@@ -35,19 +42,11 @@ impl Source {
 
     /// Reads the recording that a fit names.
     pub fn recording(&self, fit: &FitSpec) -> Result<Recording> {
-        let options = ReadOptions {
-            topic: fit.topic.clone(),
-            units: fit.units,
-            zero_is_missing: fit.zero_is_missing,
-            allow_truncated: fit.allow_truncated,
-            allow_unchecked: fit.allow_unchecked,
-        };
-        let recording = if self.embeds(fit) {
-            read_bytes(Path::new(RECORDING_NAME), RECORDING, &options)
-        } else {
-            read(&fit.markers, &options)
-        };
-        recording.map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
+        if !self.embeds(fit) {
+            return recording::read(fit);
+        }
+        read_bytes(Path::new(RECORDING_NAME), RECORDING, &recording::options(fit))
+            .map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
     }
 
     /// The recording as bytes, if it is the built-in one: a run keeps a copy, so that its lock file can be run again.
@@ -58,6 +57,31 @@ impl Source {
     /// The built-in problem uses the built-in recording unless `--set fit.markers` names another.
     fn embeds(&self, fit: &FitSpec) -> bool {
         self.built_in && &*fit.markers_place.file == NAME
+    }
+}
+
+/// The cheapest settings beside the problem file that are good enough.
+fn chosen(problem: &Path, target: f64, flags: &Flags) -> Result<Vec<String>> {
+    let path = problem.with_file_name("accuracy.toml");
+    let (measure, settings) = read_choices(&path)?;
+    if measure.unit() != "mm" {
+        let message = format!("its errors are of {}, not in mm", measure.word()).into();
+        return Err(Error::BadAccuracy { path, message });
+    }
+    let best = settings.iter().map(|s| s.error).fold(f64::INFINITY, f64::min);
+    match settings.into_iter().find(|setting| setting.error <= target) {
+        Some(setting) => {
+            if !flags.quiet {
+                tell(&format!(
+                    "accuracy: {} for {} within {target} mm (error {:.2e} mm in the study)\n",
+                    setting.name,
+                    measure.word(),
+                    setting.error
+                ));
+            }
+            Ok(setting.set)
+        }
+        None => Err(Error::AccuracyOutOfReach { path, target, best }),
     }
 }
 
@@ -82,18 +106,4 @@ pub(super) fn recording_warnings(recording: &Recording) -> Vec<Warning> {
         },
     };
     recording.health.warnings.iter().map(message).collect()
-}
-
-/// The frames of a recording that a fit asks for.
-///
-/// # Errors
-/// Where the recording does not have the first or the last of them.
-pub(super) fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>> {
-    let count = recording.frames.len();
-    let FramesSpec { first, last, step } = fit.frames;
-    let last = last.unwrap_or(count.saturating_sub(1));
-    if let Some(frame) = [first, last].into_iter().find(|frame| *frame >= count) {
-        return Err(Error::NoSuchFrame { frame, count, place: Box::new(fit.frames_place.clone()) });
-    }
-    Ok((first..=last).step_by(step).collect())
 }

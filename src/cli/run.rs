@@ -5,7 +5,7 @@ use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
 use super::progress::Meter;
 use super::terminal::tell;
-use super::{Ending, Flags, fit, forward};
+use super::{Ending, Flags, fit, forward, study};
 use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
@@ -13,7 +13,7 @@ use crate::model::Model;
 use crate::model::build::Built;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
-use crate::scene::{ControlValue, FitSpec, GeometrySpec, Task};
+use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Task};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -61,15 +61,20 @@ impl Run {
         Status { warnings, ..Status::running(tally.frames_ok, tally.failed.clone()) }.write(&self.folder)
     }
 
-    fn manifest(&self, model: &Model, work: &Work) -> Result<()> {
+    fn manifest(&self, model: Option<&Model>, work: &Work) -> Result<()> {
         let command = std::env::args().collect();
         let seconds = self.start.elapsed().as_secs_f64();
         let threads = rayon::current_num_threads();
-        Manifest::now(command, self.inputs.clone(), threads, Some(model), work, seconds).write(&self.folder)
+        Manifest::now(command, self.inputs.clone(), threads, model, work, seconds).write(&self.folder)
     }
 }
 
 pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
+    if let Some(path) = path
+        && let Problem::Study(study) = Problem::read(path, &flags.set)?
+    {
+        return study::run(&study, path, flags);
+    }
     let start = Instant::now();
     let mut source = Source::read(path, flags)?;
     // the recording is read before anything is written: a mistake in it leaves no folder behind
@@ -87,10 +92,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         return Ok(Ending::Ok);
     }
 
-    let folder = match &flags.out {
-        Some(path) => RunFolder::create_at(path, flags.force)?,
-        None => RunFolder::create(Path::new("runs"), &source.scene.name)?,
-    };
+    let folder = run_folder(&source.scene.name, flags)?;
     let mut inputs = Vec::new();
     for path in path.into_iter().map(Path::to_path_buf).chain(input_files(&source)) {
         inputs.push(Input::read(&path)?);
@@ -102,7 +104,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
 
     let mut work = Work::default();
     let outcome = task(&source, &built, clip.as_ref(), &run, flags, &mut work);
-    finish(&run, &built.model, &work, outcome, flags.strict)
+    finish(&run, Some(&built.model), &work, outcome, flags.strict)
 }
 
 fn task(
@@ -119,8 +121,30 @@ fn task(
     }
 }
 
+/// The folder that the flags name, or the next one of this name.
+fn run_folder(name: &str, flags: &Flags) -> Result<RunFolder> {
+    match &flags.out {
+        Some(path) => RunFolder::create_at(path, flags.force),
+        None => RunFolder::create(Path::new("runs"), name),
+    }
+}
+
+/// Makes the folder of a run that reads these files, and writes that it runs.
+pub(super) fn begin(name: &str, files: &[&Path], flags: &Flags) -> Result<Run> {
+    let inputs = files.iter().map(|path| Input::read(path)).collect::<Result<_>>()?;
+    let run = Run { folder: run_folder(name, flags)?, start: Instant::now(), inputs, interrupted: watch_interrupt() };
+    run.write_running(&Tally::default())?;
+    Ok(run)
+}
+
 /// Writes status and manifest whatever happened, and says how the command ends.
-fn finish(run: &Run, model: &Model, work: &Work, outcome: Result<Tally>, strict: bool) -> Result<Ending> {
+pub(super) fn finish(
+    run: &Run,
+    model: Option<&Model>,
+    work: &Work,
+    outcome: Result<Tally>,
+    strict: bool,
+) -> Result<Ending> {
     run.manifest(model, work)?;
     match outcome {
         Ok(tally) => {

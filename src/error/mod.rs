@@ -504,6 +504,24 @@ pub enum Error {
         /// The contact in the problem file.
         place: Box<Place>,
     },
+    /// A file of settings on a front that no study wrote.
+    #[error("{} is not what a study writes: {message}", path.display())]
+    BadAccuracy {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: Box<str>,
+    },
+    /// No setting on a front is as good as asked.
+    #[error("{}: no setting has an error of {target} mm or less; the best has {best:.2e} mm", path.display())]
+    AccuracyOutOfReach {
+        /// The file.
+        path: PathBuf,
+        /// What was asked, mm.
+        target: f64,
+        /// The least error there, mm.
+        best: f64,
+    },
     /// A face is on both sides of a contact.
     #[error("`{contact}`: a face of element {element} is on both sides of the contact")]
     MeetsItself {
@@ -767,6 +785,8 @@ impl Error {
             Error::BadRegion { .. } => "G021",
             Error::StartsInContact { .. } => "G022",
             Error::MeetsItself { .. } => "G024",
+            Error::BadAccuracy { .. } => "C021",
+            Error::AccuracyOutOfReach { .. } => "C022",
             Error::ExSyntax { .. } => "G008",
             Error::ExUnsupported { .. } => "G009",
             Error::ExField { .. } => "G010",

@@ -87,6 +87,14 @@ impl Error {
                  start in front of its surface)"
                     .into(),
             ),
+            Error::BadAccuracy { .. } => Some(
+                "--accuracy chooses among the settings in accuracy.toml beside the problem file: run a study of the problem and \
+                 copy the accuracy.toml that it writes there"
+                    .into(),
+            ),
+            Error::AccuracyOutOfReach { .. } => {
+                Some("ask for less, or add finer variants to the study that wrote the file".into())
+            }
             Error::MeetsItself { .. } => Some(
                 "name different faces in `face` and in `surface`; a set of faces that may touch itself is written \
                  surface = { itself = {} }"

@@ -118,8 +118,8 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         let directions = sensitivities(self.sensitivity, inner.solver, &inner.base, self.unknowns)?;
         let model = inner.solver.model();
         let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
-        for (column, direction) in directions.iter().enumerate() {
-            let du = model.displacement_of(direction);
+        for (column, (control, direction)) in self.unknowns.iter().zip(&directions).enumerate() {
+            let du = model.displacement_rate(&inner.base.state, *control, direction);
             for (row, m) in self.measured.iter().enumerate() {
                 let change = model.mesh().interpolate(self.markers[m.marker].point, &du);
                 for (i, change) in change.iter().enumerate() {

@@ -41,11 +41,11 @@ impl Range {
 /// The solver.
 pub struct GaussNewton {
     ranges: Vec<Range>,
-    /// Largest change of a control at which the fit counts as converged.
+    /// Largest change of a control, as a part of its range, at which the fit counts as converged.
     tolerance: f64,
     /// Largest change of t in one step.
     trust: f64,
-    /// Largest change of a control in the last step.
+    /// Largest change of a control in the last step, as a part of its range.
     step: f64,
 }
 
@@ -115,7 +115,8 @@ where
                 t.iter().zip(&self.ranges).map(|(t, r)| (r.to_even(r.upper) - t).max(0.0).min(self.trust)).collect();
             let d = bounded_step(&h, g.as_slice(), &lower, &upper)?;
             let trial: Vec<f64> = (0..n).map(|k| self.ranges[k].at_even(t[k] + d[k])).collect();
-            self.step = trial.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let part = |((a, b), r): ((&f64, &f64), &Range)| (a - b).abs() / (r.upper - r.lower);
+            self.step = trial.iter().zip(&q).zip(&self.ranges).map(part).fold(0.0, f64::max);
             let d = DVector::from_vec(d);
             let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));
             let last = self.step <= self.tolerance;

@@ -12,6 +12,7 @@ pub mod covariance;
 pub mod frame;
 pub mod gauss_newton;
 pub mod placement;
+pub mod recording;
 pub mod sensitivity;
 pub mod sequence;
 

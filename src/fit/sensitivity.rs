@@ -31,7 +31,7 @@ pub fn sensitivities(
     unknowns: &[usize],
 ) -> Result<Vec<Vec<f64>>> {
     match how {
-        Sensitivity::Tangent => tangent(solver, at, unknowns),
+        Sensitivity::Tangent => solver.rates(&at.state, unknowns),
         Sensitivity::FiniteDifference { step } => {
             let settings = solver.settings();
             solver.set_settings(Settings { tolerance: TIGHTER * settings.tolerance, ..settings });
@@ -40,17 +40,6 @@ pub fn sensitivities(
             found
         }
     }
-}
-
-fn tangent(solver: &mut Solver<'_>, at: &Equilibrium, unknowns: &[usize]) -> Result<Vec<Vec<f64>>> {
-    let model = solver.model();
-    let n = model.numbering().unknowns();
-    let mut columns = Vec::with_capacity(n * unknowns.len());
-    for control in unknowns {
-        columns.extend(model.control_force(&at.state, *control).iter().map(|f| -f));
-    }
-    solver.solve_with_tangent(&at.state, &mut columns, unknowns.len())?;
-    Ok(columns.chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
 }
 
 /// (x(q + h) - x(q - h)) / 2h, or (4 x(q + h) - x(q + 2h) - 3 x(q)) / 2h where q - h is out of bounds, or its mirror image

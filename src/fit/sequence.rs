@@ -40,7 +40,7 @@ pub struct Fit<'m> {
 pub struct FitIteration {
     /// 1/2 sum of squared weighted residuals after it.
     pub cost: f64,
-    /// Largest change of a control.
+    /// Largest change of a control, as a part of its range.
     pub step: f64,
     /// Trust radius after it.
     pub trust: f64,
@@ -83,17 +83,16 @@ impl<'m> Fit<'m> {
         check_units(&markers, model.mesh(), recording, fit)?;
         let settings = Settings { release: false, ..settings(scene) };
         let mut solver = Solver::new(model, settings)?;
-        let unknowns: Vec<usize> =
-            fit.unknowns.iter().flat_map(|name| model.muscle_controls(name)).copied().collect();
+        let unknowns: Vec<usize> = fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect();
         let mut held = vec![0.0; model.controls().len()];
         let mut held_curves = Vec::new();
-        let muscles: Vec<String> = scene.muscles.iter().map(|muscle| muscle.name.clone()).collect();
+        let ranges = scene.control_ranges();
         for control in &scene.controls {
-            let own = model.muscle_controls(&control.name);
+            let own = model.controls_of(&control.name);
             if let ControlValue::Csv(path) = &control.value {
                 let controls = own.iter().filter(|k| !unknowns.contains(k)).copied().collect();
-                let curves = Curves::read(path, &muscles)?;
-                held_curves.push(HeldCurve { controls, muscle: control.name.clone(), curves });
+                let curves = Curves::read(path, &ranges)?;
+                held_curves.push(HeldCurve { controls, name: control.name.clone(), curves });
             }
             for (k, value) in own.iter().zip(control.value.constants(own.len()).unwrap_or_default()) {
                 if !unknowns.contains(k) {
@@ -266,18 +265,18 @@ struct Optimum {
     iterations: Vec<FitIteration>,
 }
 
-/// Controls of one muscle that are not sought and follow a table.
+/// Controls of one name that are not sought and follow a table.
 struct HeldCurve {
     controls: Vec<usize>,
-    muscle: String,
+    name: String,
     curves: Curves,
 }
 
 /// The controls that are not sought, at a time in seconds; those that are, are 0.
 fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
     let mut held = held.to_vec();
-    for HeldCurve { controls, muscle, curves } in curves {
-        if let Some(value) = curves.at(muscle, time_s) {
+    for HeldCurve { controls, name, curves } in curves {
+        if let Some(value) = curves.at(name, time_s) {
             controls.iter().for_each(|k| held[*k] = value);
         }
     }

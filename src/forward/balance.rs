@@ -100,13 +100,19 @@ impl<'m> Balance<'m> {
     }
 
     pub fn set_target(&mut self, target: Drive) {
-        self.prescribed = self.model.supports().prescribed(self.model.mesh(), target.load);
+        self.prescribed = self.model.supports().prescribed(self.model.mesh(), target.load, &target.controls);
         self.target = target;
     }
 
     /// A state with the controls and the load of the target; prescribed motion may still be outstanding.
     pub fn at_target(&self, state: State) -> State {
         State { controls: self.target.controls.clone(), load: self.target.load, ..state }
+    }
+
+    /// The same with the faces on bones where they belong. For a guess: far from there it may be inadmissible.
+    pub fn carried(&self, mut state: State) -> State {
+        self.model.supports().carry(self.model.mesh(), &self.target.controls, &mut state.u);
+        state
     }
 
     pub fn work(&self) -> Work {
@@ -173,20 +179,44 @@ impl<'m> Balance<'m> {
         self.factor.solve(&self.tangent.matrix, rhs, 1, STEP_TOLERANCE).map(|_| ())
     }
 
+    /// d(unknowns)/d(control) at the equilibrium `state`, one control after the other: K_ff du_f = - dr/dq - K_fp du_p/dq,
+    /// with the motion u_p of faces on bones.
+    pub fn rates(&mut self, state: &State, controls: &[usize]) -> Result<Vec<f64>> {
+        let model = self.model;
+        let mut rhs = Vec::with_capacity(controls.len() * model.numbering().unknowns());
+        for control in controls {
+            let mut force = model.control_force(state, *control);
+            if let Some(moved) = model.supports().rate(model.mesh(), *control, &state.controls) {
+                let lifted = self.evaluate(state, Want::Stiffness, Some(&moved)).lifted;
+                force.iter_mut().zip(lifted).for_each(|(f, k)| *f += k);
+            }
+            rhs.extend(force.iter().map(|f| -f));
+        }
+        let moved = controls.iter().map(|control| model.constraint_control_rate(state, *control)).collect();
+        self.solve_held(state, &mut rhs, moved)?;
+        Ok(rhs)
+    }
+
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
+        self.solve_held(state, rhs, vec![None; columns])
+    }
+
+    /// One column of `rhs` for each entry of `moved`: the rate c of the gaps that comes with it, if there is one.
+    fn solve_held(&mut self, state: &State, rhs: &mut [f64], moved: Vec<Option<Vec<Vec<f64>>>>) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);
         self.assemble();
-        self.solve_assembled(rhs, columns)?;
+        self.solve_assembled(rhs, moved.len())?;
         if state.multipliers.iter().all(Vec::is_empty) {
             return Ok(());
         }
         let n = self.model.numbering().unknowns();
-        rhs.chunks_exact_mut(n.max(1)).try_for_each(|x| self.hold_constraints(state, x))
+        let columns = rhs.chunks_exact_mut(n.max(1)).zip(moved);
+        columns.into_iter().try_for_each(|(x, moved)| self.hold_constraints(state, x, moved))
     }
 
-    /// From K^-1 b to the x of K x + B^T z = b, B x = 0: conjugate gradients on B K^-1 B^T z = B K^-1 b. The operator is
-    /// positive on the range of B, and K holds the penalty, which gathers its eigenvalues below 1 / penalty.
-    fn hold_constraints(&mut self, state: &State, x: &mut [f64]) -> Result<()> {
+    /// From K^-1 b to the x of K x + B^T z = b, B x = - c: conjugate gradients on B K^-1 B^T z = B K^-1 b + c. The operator
+    /// is positive on the range of B, and K holds the penalty, which gathers its eigenvalues below 1 / penalty.
+    fn hold_constraints(&mut self, state: &State, x: &mut [f64], moved: Option<Vec<Vec<f64>>>) -> Result<()> {
         let model = self.model;
         let product = |a: &[Vec<f64>], b: &[Vec<f64>]| -> f64 {
             a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
@@ -195,9 +225,14 @@ impl<'m> Balance<'m> {
             to.iter_mut().flatten().zip(from.iter().flatten()).for_each(|(t, f)| *t += scale * f);
         };
         let mut residual = model.constraint_rate(state, x);
+        // the size of the parts before they cancel: what moves with its bone leaves rounding
+        let mut first = product(&residual, &residual);
+        if let Some(moved) = moved {
+            first += product(&moved, &moved);
+            add(&mut residual, 1.0, &moved);
+        }
         let mut direction = residual.clone();
         let mut square = product(&residual, &residual);
-        let first = square;
         for _ in 0..CONSTRAINT_ITERATIONS {
             if square <= CONSTRAINT_TOLERANCE * CONSTRAINT_TOLERANCE * first || first == 0.0 {
                 return Ok(());

@@ -1,6 +1,7 @@
 //! Equilibrium: from one state to another along a path of controls, loads and prescribed motion.
 
 mod balance;
+pub mod drives;
 mod release;
 mod work;
 
@@ -9,7 +10,9 @@ use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, Test, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
+use crate::term::bone::Bone;
 use balance::Balance;
+use std::sync::Arc;
 use std::time::Instant;
 
 pub use release::Snap;
@@ -30,7 +33,7 @@ const MULTIPLIER_ROUNDS: usize = 200;
 const LONGEST_STEP: f64 = 2.0;
 /// How far beyond the last equilibrium that could be reached the body is let go, as a part of the path.
 const BEYOND_A_LIMIT: f64 = 0.01;
-/// A support rotates by no more than this in one step, radians.
+/// A support or a bone rotates by no more than this in one step, radians.
 const LARGEST_ROTATION: f64 = std::f64::consts::PI / 8.0;
 
 /// What drives a model to an equilibrium.
@@ -184,7 +187,7 @@ impl<'m> Solver<'m> {
         to: &Drive,
     ) -> std::result::Result<Equilibrium, Box<Failure>> {
         self.balance.set_target(to.clone());
-        let guess = self.balance.at_target(guess.clone());
+        let guess = self.balance.carried(self.balance.at_target(guess.clone()));
         if self.balance.has_tangent() {
             let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
             if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
@@ -285,7 +288,13 @@ impl<'m> Solver<'m> {
                     }
                     history.push(step(place, StepKind::Failed, outcome.last, outcome.iterations));
                     let reached = stepper.reached();
-                    return Err(Box::new(Failure { error, last_good: last, reached, failed: outcome.state, history }));
+                    return Err(Box::new(Failure {
+                        error,
+                        last_good: last,
+                        reached,
+                        failed: outcome.state,
+                        history,
+                    }));
                 }
             }
         }
@@ -365,9 +374,24 @@ impl<'m> Solver<'m> {
         let exponent = changes.fold(0.0, |most: f64, change| if change.abs() > most.abs() { change } else { most });
         let angle = model.supports().largest_rotation() * (to.load - from.load).abs();
         let rotation = LARGEST_ROTATION / angle.max(f64::MIN_POSITIVE);
+        let rotation = rotation.min(self.bones_per_step(exponent.abs(), from, to));
         let first = (FIRST_STEP / exponent.abs().max(f64::MIN_POSITIVE)).min(rotation);
         let max = self.settings.step_max.min(LONGEST_STEP / exponent.abs().max(f64::MIN_POSITIVE)).min(rotation);
         (Warp { exponent }, StepLimits { first, max, min: self.settings.step_min.min(max) })
+    }
+
+    /// The longest step in which no bone turns by more than a support may, or slides by more than an element.
+    fn bones_per_step(&self, exponent: f64, from: &Drive, to: &Drive) -> f64 {
+        let model = self.balance.model;
+        let steps = |bone: &Arc<Bone>| {
+            let angle = bone.angle(&to.controls) - bone.angle(&from.controls);
+            let way = bone.way(&to.controls) - bone.way(&from.controls);
+            (angle.abs() / LARGEST_ROTATION).max(way.abs() / model.element_size())
+        };
+        let most = model.bones().iter().map(steps).fold(0.0, f64::max);
+        // steps along the path grow by exp(exponent) from one end to the other; the longest counts
+        let stretch = if exponent < 1e-3 { 1.0 } else { exponent / -(-exponent).exp_m1() };
+        1.0 / (most * stretch).max(f64::MIN_POSITIVE)
     }
 
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
@@ -396,7 +420,8 @@ impl<'m> Solver<'m> {
     fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
         let outcome = newton(&mut self.balance, start, limits)?;
         let model = self.balance.model;
-        let kinks = model.contacts().next().is_some() || (self.balance.drag.is_some() && model.muscles().next().is_some());
+        let kinks =
+            model.contacts().next().is_some() || (self.balance.drag.is_some() && model.muscles().next().is_some());
         if outcome.stop != Some(Stop::NoDescent) || !kinks {
             return Ok(outcome);
         }
@@ -448,6 +473,16 @@ impl<'m> Solver<'m> {
     /// Where the tangent cannot be factorised, or the refined solution does not reach 1e-9.
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
         self.balance.solve_with_tangent(state, rhs, columns)
+    }
+
+    /// d(unknowns)/d(control) at the equilibrium `state` by the implicit function theorem, for each of `controls`.
+    /// [`Model::displacement_rate`] adds the motion of faces on bones.
+    ///
+    /// # Errors
+    /// As [`Solver::solve_with_tangent`].
+    pub fn rates(&mut self, state: &State, controls: &[usize]) -> Result<Vec<Vec<f64>>> {
+        let n = self.model().numbering().unknowns();
+        Ok(self.balance.rates(state, controls)?.chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
     }
 }
 

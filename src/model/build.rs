@@ -1,5 +1,6 @@
 //! From a scene to a model: every table of the problem file becomes a mesh, a term or a support.
 
+use super::bones::{attachments, bone, bones};
 use super::supports::{Conflict, Support, Supports, normal_axis};
 use super::tissue::{Host, tissue};
 use super::{Control, Ingredients, Model};
@@ -20,6 +21,7 @@ use crate::scene::{
     SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
+use crate::term::bone::Bone;
 use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
 use crate::term::contact::mutual::{Between, Manner, Mutual};
 use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
@@ -28,10 +30,12 @@ use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, trac
 use crate::term::muscle::{Activation, Muscle, NotEmbedded};
 use crate::term::pressure::{self, PressureSpace};
 use crate::term::spring::{Resists, Springs};
+use std::sync::Arc;
 
 /// A model built from a scene, with the places in it that the scene names.
 pub struct Built {
-    /// The model; its controls are the activations of the muscles of the scene, one after the other.
+    /// The model; its controls are the activations of the muscles of the scene, one after the other, then the hinge and the
+    /// slide of every bone.
     pub model: Model,
     /// Where the probes of the scene are, in its order.
     pub probes: Vec<MaterialPoint>,
@@ -80,6 +84,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         let onset = if sigma_max > 0.0 { (shear_modulus / sigma_max).min(1.0) } else { 1.0 };
         controls.extend(names.into_iter().map(|name| Control { name, lower: 0.0, upper: 1.0, onset }));
     }
+    let bones = bones(scene, &mut controls);
     let point = |position: [f64; 3], what: &'static str, place: &Place| {
         locator.locate(position).map_err(|outside| Error::PointOutside {
             what,
@@ -90,7 +95,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     };
     let slidings = scene.slidings.iter().map(|spec| (spec, Allows::Closed));
     for (spec, allows) in slidings.chain(scene.contacts.iter().map(|spec| (spec, Allows::ClosedOrOpen))) {
-        match contact(scene, spec, allows, &mesh) {
+        match contact(scene, spec, allows, &mesh, bone(&bones, &spec.bone)) {
             Ok((contact, warning)) => {
                 terms.push(contact);
                 warnings.extend(warning);
@@ -125,16 +130,15 @@ pub fn build(scene: &Scene) -> Result<Built> {
             },
         }
     }
-    let mut ties = Vec::new();
+    let mut tied = Vec::new();
     for attachment in &scene.attachments {
         match point(attachment.position_mm, "the attachment", &attachment.place) {
-            Ok(at) => ties.push((at, attachment.stiffness_mn_per_mm)),
+            Ok(at) => tied.push((attachment, at)),
             Err(error) => mistakes.push(error),
         }
     }
-    if !ties.is_empty() {
-        terms.push(Box::new(Springs::attachments(&mesh, &ties)));
-    }
+    let element_size = (volume / mesh.elements() as f64).cbrt();
+    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {
@@ -148,7 +152,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     drop(locator);
-    let supports = match supports(scene, &mesh) {
+    let supports = match supports(scene, &mesh, &bones) {
         Ok(supports) => supports,
         Err(error) => {
             mistakes.push(error);
@@ -307,6 +311,7 @@ fn contact(
     spec: &ContactSpec,
     allows: Allows,
     mesh: &Mesh,
+    bone: Option<Arc<Bone>>,
 ) -> Result<(Box<dyn Term>, Option<Warning>)> {
     let own = faces(scene, mesh, &spec.face, &spec.place)?;
     let (between, depth) = match &spec.surface {
@@ -319,7 +324,7 @@ fn contact(
             (Between::Two(own, others), *depth_mm)
         }
         SurfaceSpec::Itself { depth_mm } => (Between::Itself(own), *depth_mm),
-        _ => return rigid_contact(spec, allows, mesh, &own),
+        _ => return rigid_contact(spec, allows, mesh, &own, bone),
     };
     let manner = Manner { law: contact_law(&spec.law), relax: spec.initial == InitialSpec::Relax, depth };
     let contact = Mutual::new(&spec.name, manner, mesh, between, spec.gauss);
@@ -344,6 +349,7 @@ fn rigid_contact(
     allows: Allows,
     mesh: &Mesh,
     faces: &[Face],
+    bone: Option<Arc<Bone>>,
 ) -> Result<(Box<dyn Term>, Option<Warning>)> {
     let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
     let surface: Box<dyn RigidSurface> = match spec.surface {
@@ -367,6 +373,10 @@ fn rigid_contact(
     let interface = Interface { allows, surface, law: contact_law(&spec.law), relax };
     let contact = Contact::new(&spec.name, interface, mesh, faces, spec.gauss);
     let warning = start_of_contact(spec, allows, mesh, contact.worst_start(mesh))?;
+    let contact = match bone {
+        Some(bone) => contact.on(bone),
+        None => contact,
+    };
     Ok((Box::new(contact), warning))
 }
 
@@ -431,7 +441,7 @@ fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_ele
     })
 }
 
-fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
+fn supports(scene: &Scene, mesh: &Mesh, bones: &[Arc<Bone>]) -> Result<Supports> {
     let plane = |face: &FaceSpec, place: &Place| {
         normal_axis(mesh, &faces(scene, mesh, face, place)?)
             .ok_or_else(|| Error::NotNormalToAxis { face: face.to_string().into(), place: Box::new(place.clone()) })
@@ -439,7 +449,13 @@ fn supports(scene: &Scene, mesh: &Mesh) -> Result<Supports> {
     let mut all = Vec::new();
     for spec in &scene.supports {
         all.push(match &spec.kind {
-            SupportKind::Clamp { face } => Support::Clamp { faces: faces(scene, mesh, face, &spec.place)? },
+            SupportKind::Clamp { face, bone: name } => {
+                let faces = faces(scene, mesh, face, &spec.place)?;
+                match bone(bones, name) {
+                    Some(bone) => Support::Carried { faces, bone },
+                    None => Support::Clamp { faces },
+                }
+            }
             SupportKind::Symmetry { face } => {
                 Support::Symmetry { faces: faces(scene, mesh, face, &spec.place)?, axis: plane(face, &spec.place)? }
             }

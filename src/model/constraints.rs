@@ -45,16 +45,40 @@ impl Model {
 
     /// z = B dx over the closed points of all constraints, for a direction in the unknowns.
     pub fn constraint_rate(&self, state: &State, direction: &[f64]) -> Vec<Vec<f64>> {
-        let du = self.displacement_of(direction);
+        self.constraint_rate_along(state, &self.displacement_of(direction))
+    }
+
+    /// sqrt(w) dg/dq over the closed points for a control q that moves what they meet, or faces with them; `None` for one
+    /// that moves neither.
+    pub fn constraint_control_rate(&self, state: &State, control: usize) -> Option<Vec<Vec<f64>>> {
+        let moved = self.supports().rate(self.mesh(), control, &state.controls);
+        let own = |term: &usize| self.terms()[*term].controls().contains(&control);
+        let constraints = self.terms().iter().enumerate().filter_map(|(k, t)| Some((k, t.as_constraint()?)));
+        let meant: Vec<_> = constraints.filter(|(term, _)| own(term)).collect();
+        if moved.is_none() && meant.is_empty() {
+            return None;
+        }
+        let still = || state.multipliers.iter().map(|m| vec![0.0; m.len()]).collect();
+        let mut z = moved.map_or_else(still, |moved| self.constraint_rate_along(state, &moved));
+        for (term, constraint) in meant {
+            for element in self.elements_of(term) {
+                self.with_own(state, term, element, |at| constraint.add_control_rate(control, at, &mut z[term]));
+            }
+        }
+        Some(z)
+    }
+
+    /// B du for any change of the displacement, one triple per global parameter.
+    fn constraint_rate_along(&self, state: &State, du: &[[f64; 3]]) -> Vec<Vec<f64>> {
         let mut z: Vec<Vec<f64>> = state.multipliers.iter().map(|m| vec![0.0; m.len()]).collect();
         for (term, constraint) in self.terms().iter().enumerate().filter_map(|(k, t)| Some((k, t.as_constraint()?))) {
             for element in self.elements_of(term) {
-                let local = self.mesh().local_of(element, &du);
+                let local = self.mesh().local_of(element, du);
                 self.with_own(state, term, element, |at| constraint.constraint_rate(at, &local, &mut z[term]));
             }
         }
         for (term, coupling) in self.couplings().filter(|(_, c)| c.multipliers() > 0) {
-            self.with_body(state, term, |body| coupling.constraint_rate(body, &du, &mut z[term]));
+            self.with_body(state, term, |body| coupling.constraint_rate(body, du, &mut z[term]));
         }
         z
     }

@@ -1,6 +1,7 @@
 //! mesh + terms + supports -> energy, residual, tangent, control forces. Immutable, shared by all solves and threads.
 
 mod assembly;
+mod bones;
 pub mod build;
 mod constraints;
 mod numbering;
@@ -21,6 +22,7 @@ use crate::math::ordering::Ordering;
 use crate::math::sparse::{BlockPattern, SymmetricMatrix};
 use crate::mesh::Mesh;
 use crate::mesh::face::Face;
+use crate::term::bone::{Bone, Wrench};
 use crate::term::contact::ContactPoint;
 use crate::term::contact::law::Allows;
 use crate::term::coupling::{BodyState, Coupling, FacePair};
@@ -31,7 +33,7 @@ use assembly::{Parts, Plan};
 use std::sync::Arc;
 use supports::Supports;
 
-/// A quantity that drives the model from outside: an activation.
+/// A quantity that drives the model from outside: an activation, the angle of a hinge in degrees, the way of a slide in mm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Control {
     /// Its name in problem files and tables.
@@ -41,7 +43,8 @@ pub struct Control {
     /// Largest admissible value.
     pub upper: f64,
     /// The value at which the response begins to saturate: for an activation the tissue's shear modulus over
-    /// sigma_max. Steps of a path are even in ln(value + onset).
+    /// sigma_max. Steps of a path are even in ln(value + onset). The response to a bone is about even in its pose itself:
+    /// its onset lies far beyond its range.
     pub onset: f64,
 }
 
@@ -70,6 +73,8 @@ pub struct Model {
     pattern: Arc<BlockPattern>,
     symbolic: Arc<Symbolic>,
     plan: Plan,
+    /// The bones that carry something, each once.
+    bones: Vec<Arc<Bone>>,
     /// The order of elimination, chosen with the faces that are near each other at rest.
     ordering: Ordering,
 }
@@ -88,7 +93,14 @@ impl Model {
         let pattern = Arc::new(pattern(&numbering, mesh, &[]));
         let symbolic = Symbolic::new(pattern.clone(), &ordering)?;
         let plan = Plan::new(mesh, *space, terms, &numbering);
-        Ok(Model { numbering, pattern, symbolic, plan, ordering, ingredients })
+        let mut bones: Vec<Arc<Bone>> = Vec::new();
+        for bone in supports.bones().chain(terms.iter().filter_map(|term| term.as_carried()?.bone())) {
+            if !bones.iter().any(|known| known.name() == bone.name()) {
+                bones.push(bone.clone());
+            }
+        }
+        bones.sort_by(|a, b| a.controls().cmp(b.controls()));
+        Ok(Model { numbering, pattern, symbolic, plan, bones, ordering, ingredients })
     }
 
     /// The host.
@@ -109,6 +121,32 @@ impl Model {
     /// The controls of the muscle of this name: one, or one for every node of its mesh. None if there is no such muscle.
     pub fn muscle_controls(&self, name: &str) -> &[usize] {
         self.terms().iter().find(|t| t.as_muscle().is_some() && t.name() == name).map_or(&[], |t| t.controls())
+    }
+
+    /// The controls that go by a name: those of a muscle, or the one control that is called so.
+    pub fn controls_of(&self, name: &str) -> Vec<usize> {
+        match self.muscle_controls(name) {
+            [] => (0..self.controls().len()).filter(|control| self.controls()[*control].name == name).collect(),
+            own => own.to_vec(),
+        }
+    }
+
+    /// The bones that carry something, in the order of their controls.
+    pub fn bones(&self) -> &[Arc<Bone>] {
+        &self.bones
+    }
+
+    /// What a bone exerts on the body at a state, with the forces dPi/du on all parameters there.
+    pub fn wrench(&self, bone: &Bone, state: &State, force: &[[f64; 3]]) -> Wrench {
+        let mut wrench = self.supports().wrench(self.mesh(), bone.name(), force, &self.current(state));
+        for (term, carried) in self.terms().iter().enumerate().filter_map(|(k, t)| Some((k, t.as_carried()?))) {
+            if carried.bone().is_some_and(|own| own.name() == bone.name()) {
+                for element in (0..self.mesh().elements()).filter(|element| self.terms()[term].acts_on(*element)) {
+                    wrench.add(&self.with_own(state, term, element, |at| carried.wrench(at)));
+                }
+            }
+        }
+        wrench
     }
 
     /// What the slidings and contacts among the terms allow, each with its index in [`Model::terms`].
@@ -252,7 +290,8 @@ impl Model {
         self.parts().assemble(workspace, &mut tangent.matrix);
     }
 
-    /// dr/d(control) for the unknowns: the force per unit of a control.
+    /// dr/d(control) for the unknowns, of the terms that depend on it: the force per unit of a control. What faces on bones
+    /// add by moving is K times [`Supports::rate`].
     pub fn control_force(&self, state: &State, control: usize) -> Vec<f64> {
         self.force_of(
             state,
@@ -392,6 +431,16 @@ impl Model {
         for (index, p) in state.p.iter_mut().enumerate() {
             *p += factor * direction[self.numbering.pressure_unknown(index)];
         }
+    }
+
+    /// du/d(control) on all displacement parameters where the unknowns move along `direction` with that control: faces on
+    /// bones move too.
+    pub fn displacement_rate(&self, state: &State, control: usize, direction: &[f64]) -> Vec<[f64; 3]> {
+        let mut rate = self.displacement_of(direction);
+        if let Some(carried) = self.supports().rate(self.mesh(), control, &state.controls) {
+            rate.iter_mut().flatten().zip(carried.iter().flatten()).for_each(|(r, c)| *r += c);
+        }
+        rate
     }
 
     /// The free displacements of a direction, one triple per global parameter; prescribed entries are zero.

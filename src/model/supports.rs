@@ -7,6 +7,8 @@
 use crate::math::tensor::{IDENTITY, Matrix, Vector, add_scaled, apply, cross, dot, normalised, rotation, subtract};
 use crate::mesh::Mesh;
 use crate::mesh::face::Face;
+use crate::term::bone::{Bone, Wrench};
+use std::sync::Arc;
 
 /// A prescribed motion of a set of faces.
 #[derive(Debug, Clone)]
@@ -52,6 +54,13 @@ pub enum Support {
         /// Displacement of the origin at full load, mm.
         offset: Vector,
     },
+    /// The motion of a bone, whatever the load.
+    Carried {
+        /// The faces.
+        faces: Vec<Face>,
+        /// The bone that they are grown to.
+        bone: Arc<Bone>,
+    },
 }
 
 /// All supports of a model: which parameters are prescribed, and to what.
@@ -77,6 +86,7 @@ impl Supports {
     /// Of a mesh. Supports may overlap only where they agree.
     pub fn new(mesh: &Mesh, supports: Vec<Support>) -> Result<Supports, Conflict> {
         let mut owner: Vec<[Option<usize>; 3]> = vec![[None; 3]; mesh.parameters.len()];
+        let posed = a_pose(&supports);
         let mut parameters = Vec::with_capacity(supports.len());
         for (index, support) in supports.iter().enumerate() {
             let (faces, components) = support.reach();
@@ -85,7 +95,7 @@ impl Supports {
                 for component in components.clone() {
                     let slot = &mut owner[parameter][component];
                     match *slot {
-                        Some(other) if !agree(mesh, &supports[other], support, parameter, component) => {
+                        Some(other) if !agree(mesh, [&supports[other], support], parameter, component, &posed) => {
                             let node = mesh.parameter_node[parameter];
                             return Err(Conflict { supports: (other, index), node });
                         }
@@ -115,18 +125,75 @@ impl Supports {
         self.supports.iter().map(angle).fold(0.0, f64::max)
     }
 
-    /// The prescribed displacements at a load factor: (parameter, component, mm).
-    pub fn prescribed(&self, mesh: &Mesh, load: f64) -> Vec<(usize, usize, f64)> {
+    /// The prescribed displacements at a load factor and for the controls of a model: (parameter, component, mm).
+    pub fn prescribed(&self, mesh: &Mesh, load: f64, controls: &[f64]) -> Vec<(usize, usize, f64)> {
         let mut all = Vec::new();
         for (parameter, owners) in self.owner.iter().enumerate() {
             for (component, owner) in owners.iter().enumerate() {
                 if let Some(owner) = owner {
-                    let u = self.supports[*owner].displacement(mesh, parameter, load);
+                    let u = self.supports[*owner].displacement(mesh, parameter, load, controls);
                     all.push((parameter, component, u[component]));
                 }
             }
         }
         all
+    }
+
+    /// The bones that carry faces.
+    pub fn bones(&self) -> impl Iterator<Item = &Arc<Bone>> {
+        self.supports.iter().filter_map(|support| match support {
+            Support::Carried { bone, .. } => Some(bone),
+            _ => None,
+        })
+    }
+
+    /// Moves the faces on bones to where their bones are.
+    pub fn carry(&self, mesh: &Mesh, controls: &[f64], u: &mut [Vector]) {
+        for (parameter, component, support) in self.carried() {
+            u[parameter][component] = support.displacement(mesh, parameter, 0.0, controls)[component];
+        }
+    }
+
+    /// du/d(control) of the faces on bones, one triple per global parameter; `None` for a control that moves none.
+    pub fn rate(&self, mesh: &Mesh, control: usize, controls: &[f64]) -> Option<Vec<Vector>> {
+        if !self.bones().any(|bone| bone.controls().contains(&control)) {
+            return None;
+        }
+        let mut rate = vec![[0.0; 3]; mesh.parameters.len()];
+        for (parameter, component, support) in self.carried() {
+            let Support::Carried { bone, .. } = support else { continue };
+            let Some(twist) = bone.twist(control, controls) else { continue };
+            let (pose, x) = (bone.pose(controls), mesh.parameters[parameter]);
+            let value = mesh.parameter_derivative[parameter] == 0;
+            let moved = if value { twist.velocity(pose.place(x)) } else { twist.turning(pose.turn(x)) };
+            rate[parameter][component] = moved[component];
+        }
+        Some(rate)
+    }
+
+    /// What a bone exerts on the body through its faces, from the forces dPi/du on all parameters and the current
+    /// parameters of x.
+    pub fn wrench(&self, mesh: &Mesh, name: &str, force: &[Vector], x: &[Vector]) -> Wrench {
+        let mut wrench = Wrench::default();
+        for (parameter, component, support) in self.carried() {
+            if !matches!(support, Support::Carried { bone, .. } if bone.name() == name) {
+                continue;
+            }
+            let own = std::array::from_fn(|i| if i == component { force[parameter][i] } else { 0.0 });
+            match mesh.parameter_derivative[parameter] {
+                0 => wrench.add_force(own, x[parameter]),
+                _ => wrench.add_moment(own, x[parameter]),
+            }
+        }
+        wrench
+    }
+
+    /// What bones prescribe: (parameter, component, support).
+    fn carried(&self) -> impl Iterator<Item = (usize, usize, &Support)> {
+        let all = self.owner.iter().enumerate().filter(|_| self.bones().next().is_some());
+        all.flat_map(|(parameter, owners)| (0..3).map(move |component| (parameter, component, owners[component])))
+            .filter_map(|(parameter, component, owner)| Some((parameter, component, &self.supports[owner?])))
+            .filter(|(.., support)| matches!(support, Support::Carried { .. }))
     }
 
     /// For every rotation in turn: (torque about its axis in mN mm, force along it in mN) that the support exerts on
@@ -155,14 +222,17 @@ impl Supports {
 impl Support {
     fn reach(&self) -> (&[Face], std::ops::Range<usize>) {
         match self {
-            Support::Clamp { faces } | Support::Rotate { faces, .. } | Support::Affine { faces, .. } => (faces, 0..3),
+            Support::Clamp { faces }
+            | Support::Rotate { faces, .. }
+            | Support::Affine { faces, .. }
+            | Support::Carried { faces, .. } => (faces, 0..3),
             Support::Symmetry { faces, axis } | Support::Plate { faces, axis, .. } => (faces, *axis..*axis + 1),
         }
     }
 
     /// Displacement of a global parameter: u = (R - I)(X - c) for values, (R - I) X for derivatives; likewise for an
-    /// affine motion.
-    fn displacement(&self, mesh: &Mesh, parameter: usize, load: f64) -> Vector {
+    /// affine motion and for a bone.
+    fn displacement(&self, mesh: &Mesh, parameter: usize, load: f64, controls: &[f64]) -> Vector {
         match self {
             Support::Clamp { .. } | Support::Symmetry { .. } => [0.0; 3],
             // of the component along the axis, the only one that is prescribed
@@ -182,12 +252,24 @@ impl Support {
                 let value = f64::from(u8::from(mesh.parameter_derivative[parameter] == 0));
                 add_scaled(apply(gradient, x), value, *offset).map(|u| load * u)
             }
+            Support::Carried { bone, .. } => {
+                let (pose, x) = (bone.pose(controls), mesh.parameters[parameter]);
+                let value = mesh.parameter_derivative[parameter] == 0;
+                if value { pose.motion(x) } else { pose.turning(x) }
+            }
         }
     }
 }
 
-fn agree(mesh: &Mesh, a: &Support, b: &Support, parameter: usize, component: usize) -> bool {
-    let (u, v) = (a.displacement(mesh, parameter, 1.0), b.displacement(mesh, parameter, 1.0));
+/// Controls at which no two bones move alike: what agrees here agrees everywhere.
+fn a_pose(supports: &[Support]) -> Vec<f64> {
+    let bones = supports.iter().filter_map(|s| if let Support::Carried { bone, .. } = s { Some(bone) } else { None });
+    let last = bones.flat_map(|bone| bone.controls()).max();
+    (0..last.map_or(0, |last| last + 1)).map(|control| 7.3 + 1.1 * control as f64).collect()
+}
+
+fn agree(mesh: &Mesh, [a, b]: [&Support; 2], parameter: usize, component: usize, controls: &[f64]) -> bool {
+    let (u, v) = (a.displacement(mesh, parameter, 1.0, controls), b.displacement(mesh, parameter, 1.0, controls));
     (u[component] - v[component]).abs() <= 1e-12 * (1.0 + u[component].abs())
 }
 

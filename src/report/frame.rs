@@ -77,6 +77,23 @@ pub struct MuscleState<'a> {
     pub energy: f64,
 }
 
+/// A bone at a state. Forces are those of the bone on the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoneState<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its angle, degrees; `None` without a hinge.
+    pub hinge_deg: Option<f64>,
+    /// Its way, mm; `None` without a slide.
+    pub slide_mm: Option<f64>,
+    /// Torque about the hinge where it is now, mN mm: the work per radian.
+    pub torque: Option<f64>,
+    /// Force along the slide, mN: the work per mm.
+    pub slide_force: Option<f64>,
+    /// The whole force, mN.
+    pub force: Vector,
+}
+
 /// A sliding or contact at a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactState<'a> {
@@ -131,6 +148,25 @@ pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluatio
         }
     };
     model.muscles().map(muscle_state).collect()
+}
+
+/// The bones of a model at a state, in the order of their controls.
+pub fn bone_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluation) -> Vec<BoneState<'m>> {
+    let controls = &state.controls;
+    let bone_state = |bone: &'m std::sync::Arc<crate::term::bone::Bone>| {
+        let wrench = model.wrench(bone, state, &evaluation.force);
+        let power = |control: usize| bone.twist(control, controls).map(|twist| wrench.power(&twist));
+        BoneState {
+            name: bone.name(),
+            hinge_deg: bone.hinge().map(|hinge| controls[hinge.control]),
+            slide_mm: bone.slide().map(|slide| controls[slide.control]),
+            // per degree to per radian
+            torque: bone.hinge().and_then(|hinge| power(hinge.control)).map(f64::to_degrees),
+            slide_force: bone.slide().and_then(|slide| power(slide.control)),
+            force: wrench.force,
+        }
+    };
+    model.bones().iter().map(bone_state).collect()
 }
 
 /// All slidings and contacts of a model at a state, in the order of its terms.

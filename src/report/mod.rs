@@ -20,13 +20,15 @@ pub mod pvd;
 pub mod record;
 pub mod run_folder;
 pub mod status;
+pub mod study;
 pub mod summary;
 pub mod tables;
 pub mod view;
 pub mod vtu;
 
 pub use frame::{
-    ContactState, Frame, MarkerPair, MuscleState, Probe, ProbeState, contact_states, muscle_states, probe_states,
+    BoneState, ContactState, Frame, MarkerPair, MuscleState, Probe, ProbeState, bone_states, contact_states,
+    muscle_states, probe_states,
 };
 pub use manifest::{Input, Manifest};
 pub use record::Record;

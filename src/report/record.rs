@@ -1,10 +1,10 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
-use super::frame::{Frame, MarkerPair, Probe, contact_states, muscle_states, probe_states};
+use super::frame::{Frame, MarkerPair, Probe, bone_states, contact_states, muscle_states, probe_states};
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, ContactTable, ConvergenceTable, EnergyTable, FitTable, MarkerTable, MuscleTable, ProbeTable,
-    write_cost,
+    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, FitTable, MarkerTable, MuscleTable,
+    ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
@@ -25,6 +25,7 @@ pub struct Record<'a> {
     energies: EnergyTable,
     convergence: ConvergenceTable,
     muscles: Option<MuscleTable>,
+    bones: Option<BoneTable>,
     contacts: Option<ContactTable>,
     fit: Option<(MarkerTable, FitTable)>,
     probe_table: Option<ProbeTable>,
@@ -56,6 +57,7 @@ impl<'a> Record<'a> {
             energies: EnergyTable::create(run, model)?,
             convergence: ConvergenceTable::create(run)?,
             muscles: model.muscles().next().map(|_| MuscleTable::create(run)).transpose()?,
+            bones: model.bones().first().map(|_| BoneTable::create(run)).transpose()?,
             contacts: model.contacts().next().map(|_| ContactTable::create(run)).transpose()?,
             fit: if fitted { Some((MarkerTable::create(run)?, FitTable::create(run)?)) } else { None },
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
@@ -84,6 +86,9 @@ impl<'a> Record<'a> {
         self.convergence.add(frame, &equilibrium.history)?;
         if let Some(table) = &mut self.muscles {
             table.add(frame, &muscle_states(self.model, state, &equilibrium.evaluation))?;
+        }
+        if let Some(table) = &mut self.bones {
+            table.add(frame, &bone_states(self.model, state, &equilibrium.evaluation))?;
         }
         if let Some(table) = &mut self.contacts {
             table.add(frame, &contact_states(self.model, state))?;

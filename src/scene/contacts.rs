@@ -1,7 +1,7 @@
 //! `[[sliding]]` and `[[contact]]`: a face, what it meets, and the law between them.
 
 use super::cursor::{FINITE, Item, POSITIVE, Reader, Table};
-use super::interpret::{face, faces};
+use super::interpret::{direction, face, faces};
 use super::spec::*;
 
 type Contacts = Option<Vec<ContactSpec>>;
@@ -36,6 +36,13 @@ fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[La
                 surface => Some(surface),
             }
         });
+    let bone = table.optional("bone", |item| match surface {
+        Some(SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. }) => item.out_of_range(
+            "a bone",
+            "left out: faces move with the body; clamp them to the bone if they belong to it",
+        ),
+        _ => item.name(),
+    });
     let law = table
         .required("law", "law = { penalty = { kpa_per_mm = 10 } }", |item| item.table(|table| table.one_of(laws)));
     let initials = [("refuse", InitialSpec::Refuse), ("relax", InitialSpec::Relax)];
@@ -50,6 +57,7 @@ fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[La
         name: name?,
         face: face?,
         surface: surface?,
+        bone: bone?,
         law: law?,
         initial: initial?,
         gauss: gauss?,
@@ -116,13 +124,6 @@ fn capsule(table: &mut Table) -> Option<SurfaceSpec> {
 fn round(table: &mut Table) -> (Option<f64>, Option<bool>) {
     let radius_mm = table.required("radius_mm", "radius_mm = 20", |item| item.number(POSITIVE));
     (radius_mm, table.or("inside", false, |item| item.flag()))
-}
-
-fn direction(item: Item) -> Option<[f64; 3]> {
-    match item.numbers(FINITE)? {
-        [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
-        direction => Some(direction),
-    }
 }
 
 fn stiffness(table: &mut Table) -> Option<f64> {

@@ -49,7 +49,7 @@ pub(super) struct Item<'a> {
 }
 
 impl<'a> Item<'a> {
-    fn wrong_type<T>(&self, expected: &str) -> Option<T> {
+    pub fn wrong_type<T>(&self, expected: &str) -> Option<T> {
         self.mistakes.add(Error::WrongType {
             key: self.path.clone(),
             expected: expected.into(),

@@ -1,41 +1,42 @@
-//! Activations over time, read from a table: `time_s,<control>,...`, one row per instant.
+//! Controls over time, read from a table: `time_s,<control>,...`, one row per instant.
 
 use super::cursor::Mistakes;
 use super::references::{first_use, help_for_name};
+use super::spec::{ControlKind, ControlRange};
 use crate::error::{Error, Place, Result};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Activations over time, linear between the rows and constant before the first and after the last.
+/// Activations and poses of bones over time, linear between the rows and constant before the first and after the last.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curves {
     /// The instants, s, increasing; at least one.
     pub times_s: Vec<f64>,
     /// The controls, in the order of their columns.
     pub names: Vec<String>,
-    /// For each control, its activation (0 to 1) at every instant.
+    /// For each control, its value at every instant: an activation from 0 to 1, degrees of a hinge, mm of a slide.
     pub columns: Vec<Vec<f64>>,
 }
 
 impl Curves {
-    /// Reads the table at `path`, whose columns may be any of `muscles`.
+    /// Reads the table at `path`, whose columns may be any of `controls`.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, otherwise every mistake in it, each with its line and column.
-    pub fn read(path: &Path, muscles: &[String]) -> Result<Curves> {
+    pub fn read(path: &Path, controls: &[ControlRange]) -> Result<Curves> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
             action: "read",
             path: path.into(),
             source,
         })?;
-        Curves::parse(&text, &path.display().to_string(), muscles)
+        Curves::parse(&text, &path.display().to_string(), controls)
     }
 
     /// Reads the text of a table; `file` is what messages call it.
     ///
     /// # Errors
     /// Every mistake in the text, each with its line and column.
-    pub fn parse(text: &str, file: &str, muscles: &[String]) -> Result<Curves> {
+    pub fn parse(text: &str, file: &str, controls: &[ControlRange]) -> Result<Curves> {
         let mistakes = Mistakes::default();
         let file: Arc<str> = file.into();
         let mut lines = text
@@ -53,20 +54,25 @@ impl Curves {
                 place: header.first().map_or_else(|| Place::whole(&file), |cell| cell.place.clone()),
             });
         }
-        let controls = header.get(1..).unwrap_or_default();
+        let named = header.get(1..).unwrap_or_default();
         let mut seen = Vec::new();
-        for Cell { text, place } in controls {
-            if !muscles.iter().any(|muscle| muscle == text) {
-                let help = help_for_name(text, muscles, "muscles");
-                mistakes.add(Error::UnknownName { kind: "muscle", name: (*text).into(), help, place: place.clone() });
+        // the range of each column
+        let mut ranges: Vec<Option<&ControlRange>> = Vec::new();
+        for Cell { text, place } in named {
+            ranges.push(controls.iter().find(|control| control.name == *text));
+            if ranges.last().is_some_and(Option::is_none) {
+                let (kind, kinds) = what(controls);
+                let known: Vec<String> = controls.iter().map(|control| control.name.clone()).collect();
+                let help = help_for_name(text, &known, kinds);
+                mistakes.add(Error::UnknownName { kind, name: (*text).into(), help, place: place.clone() });
             }
             first_use("column", text, place, &mut seen, &mistakes);
         }
 
         let mut curves = Curves {
             times_s: Vec::new(),
-            names: controls.iter().map(|cell| cell.text.to_string()).collect(),
-            columns: vec![Vec::new(); controls.len()],
+            names: named.iter().map(|cell| cell.text.to_string()).collect(),
+            columns: vec![Vec::new(); named.len()],
         };
         for line in lines {
             let cells = line.cells();
@@ -88,8 +94,10 @@ impl Curves {
                     _ => curves.times_s.push(time_s),
                 }
             }
-            for ((value, name), column) in values.iter().zip(&curves.names).zip(&mut curves.columns) {
-                column.extend(value.activation(name, &mistakes));
+            for ((value, range), (name, column)) in
+                values.iter().zip(&ranges).zip(curves.names.iter().zip(&mut curves.columns))
+            {
+                column.extend(value.control(name, *range, &mistakes));
             }
         }
         let mistakes = mistakes.sorted(&file);
@@ -104,7 +112,7 @@ impl Curves {
         Ok(curves)
     }
 
-    /// The activation of `control` at a time in seconds; `None` if it has no column.
+    /// The value of `control` at a time in seconds; `None` if it has no column.
     pub fn at(&self, control: &str, time_s: f64) -> Option<f64> {
         let column = &self.columns[self.names.iter().position(|name| name == control)?];
         let after = self.times_s.partition_point(|&time| time <= time_s);
@@ -117,6 +125,14 @@ impl Curves {
         // a(t) = a0 + (a1 - a0) (t - t0) / (t1 - t0)
         let part = (time_s - self.times_s[after - 1]) / (self.times_s[after] - self.times_s[after - 1]);
         Some(column[after - 1] + part * (column[after] - column[after - 1]))
+    }
+}
+
+/// What controls are called: one, and several.
+pub(super) fn what(controls: &[ControlRange]) -> (&'static str, &'static str) {
+    match controls.iter().all(|control| control.kind == ControlKind::Activation) {
+        true => ("muscle", "muscles"),
+        false => ("control", "controls"),
     }
 }
 
@@ -168,13 +184,16 @@ impl Cell<'_> {
         None
     }
 
-    fn activation(&self, column: &str, mistakes: &Mistakes) -> Option<f64> {
-        let activation = self.number(column, mistakes)?;
-        if (0.0..=1.0).contains(&activation) {
-            return Some(activation);
+    /// A number in the range of its control; any number where the control is not known.
+    fn control(&self, column: &str, range: Option<&ControlRange>, mistakes: &Mistakes) -> Option<f64> {
+        let value = self.number(column, mistakes)?;
+        match range.filter(|range| !range.holds(value)) {
+            None => Some(value),
+            Some(range) => {
+                mistakes.add(self.out_of_range(column, &range.allowed()));
+                None
+            }
         }
-        mistakes.add(self.out_of_range(column, "an activation from 0 to 1"));
-        None
     }
 
     fn out_of_range(&self, column: &str, allowed: &str) -> Error {

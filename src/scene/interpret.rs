@@ -1,6 +1,7 @@
 //! From a tree to a scene: which keys there are, what each may hold, and what stands for it when it is absent.
 
 use super::Scene;
+use super::bones;
 use super::contacts;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
 use super::references::References;
@@ -25,11 +26,13 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let word = tissue.as_ref().map(|tissue| tissue.law.word());
         let regions = file.tables("region", |table| region(table, word));
         let muscles = file.tables("muscle", |table| muscle(table, references));
+        let bones = file.tables("bone", bones::bone);
         let supports = file.tables("support", support);
         let (slidings, contacts) = contacts::both(file);
         let loads = file.tables("load", load);
-        let attachments = file.tables("attachment", attachment);
-        let controls = file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref()));
+        let attachments = file.tables("attachment", bones::attachment);
+        let controls =
+            file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref(), bones.as_deref()));
         let probes = file.tables("probe", probe);
         let fit = if fitting {
             file.required("fit", "[fit]\nmarkers = \"recording.mcap\"\nunits = \"m\"", |item| {
@@ -41,7 +44,9 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let markers = file.tables("marker", marker);
         if fitting {
             file.must_hold("marker", "[[marker]]\nname = \"M01\"\nposition_mm = [30, 10, 20]");
-            file.must_hold("muscle", "[[muscle]]\nname = \"slab\"\n...");
+            if !file.has("bone") {
+                file.must_hold("muscle", "[[muscle]]\nname = \"slab\"\n...");
+            }
         }
         let solver = file.or("solver", SolverSpec::default(), |item| item.table(solver));
         let output = file.or("output", OutputSpec::default(), |item| item.table(output));
@@ -53,6 +58,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
             tissue: tissue?,
             regions: regions?,
             muscles: muscles?,
+            bones: bones?,
             supports: supports?,
             slidings: slidings?,
             contacts: contacts?,
@@ -90,7 +96,7 @@ impl Default for FramesSpec {
 
 fn task(table: &mut Table) -> Option<Task> {
     let kinds = [("forward", Task::Forward), ("fit", Task::Fit)];
-    let later = [("fibres", "fits fibre angles to measured directions"), ("study", "error against time")];
+    let later = [("fibres", "fits fibre angles to measured directions")];
     table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &later))
 }
 
@@ -227,7 +233,7 @@ fn guccione(table: &mut Table) -> Option<LawSpec> {
 }
 
 /// A vector that is not zero.
-fn direction(item: Item) -> Option<[f64; 3]> {
+pub(super) fn direction(item: Item) -> Option<[f64; 3]> {
     match item.numbers(FINITE)? {
         [0.0, 0.0, 0.0] => item.out_of_range("[0, 0, 0]", "a direction, not all 0"),
         direction => Some(direction),
@@ -332,7 +338,12 @@ fn blemker(table: &mut Table) -> Option<BlemkerSpec> {
 }
 
 fn support(table: &mut Table) -> Option<SupportSpec> {
-    let clamp: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Clamp { face: face(table)? }));
+    let clamp: Reader<SupportKind> = |item| {
+        item.table(|table| {
+            let (face, bone) = (face(table), bones::carried(table));
+            Some(SupportKind::Clamp { face: face?, bone: bone? })
+        })
+    };
     let symmetry: Reader<SupportKind> = |item| item.table(|table| Some(SupportKind::Symmetry { face: face(table)? }));
     let kind = table.one_of(&[
         ("clamp", clamp),
@@ -428,13 +439,6 @@ fn spring(table: &mut Table) -> Option<LoadKind> {
     Some(LoadKind::Spring { face: face?, kpa_per_mm: kpa_per_mm?, normal_only: normal_only? })
 }
 
-fn attachment(table: &mut Table) -> Option<AttachmentSpec> {
-    let position_mm = table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE));
-    let stiffness =
-        table.required("stiffness_mn_per_mm", "stiffness_mn_per_mm = 20", |item| item.number(NOT_NEGATIVE));
-    Some(AttachmentSpec { position_mm: position_mm?, stiffness_mn_per_mm: stiffness?, place: table.place() })
-}
-
 fn traction(table: &mut Table) -> Option<LoadKind> {
     let face = face(table);
     let kpa = table.required("kpa", "kpa = [0, 0, -0.04]", |item| item.numbers(FINITE));
@@ -471,7 +475,13 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let sensitivities =
         [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
     let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
-    let unknowns = table.or("unknowns", references.muscles(), |item| references.unknowns(&item));
+    let unknowns = match references.muscles() {
+        // which of the bones are sought must be said
+        none if none.is_empty() && references.has_bones() => {
+            table.required("unknowns", "unknowns = [\"jaw.hinge\"]", |item| references.unknowns(&item))
+        }
+        muscles => table.or("unknowns", muscles, |item| references.unknowns(&item)),
+    };
     let zero_is_missing = table.or("zero_is_missing", true, |item| item.flag());
     let allow_truncated = table.or("allow_truncated", false, |item| item.flag());
     let allow_unchecked = table.or("allow_unchecked", false, |item| item.flag());

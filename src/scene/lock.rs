@@ -44,6 +44,7 @@ impl Scene {
             tissue,
             regions,
             muscles,
+            bones,
             supports,
             slidings,
             contacts,
@@ -68,13 +69,20 @@ impl Scene {
         tissue_lines(tissue, &mut lines);
         regions.iter().for_each(|region| region_lines(region, &mut lines));
         muscles.iter().for_each(|muscle| muscle_lines(muscle, &mut lines));
+        bones.iter().for_each(|bone| bone_lines(bone, &mut lines));
         supports.iter().for_each(|support| lines.extend(["\n[[support]]".into(), support_line(&support.kind)]));
         slidings.iter().for_each(|sliding| contact_lines("sliding", sliding, &mut lines));
         contacts.iter().for_each(|contact| contact_lines("contact", contact, &mut lines));
         loads.iter().for_each(|load| lines.extend(["\n[[load]]".into(), load_line(&load.kind)]));
-        for AttachmentSpec { position_mm, stiffness_mn_per_mm, place: _ } in attachments {
+        for AttachmentSpec { position_mm, tie, bone, place: _ } in attachments {
             lines.extend(["\n[[attachment]]".into(), format!("position_mm = {}", numbers(position_mm))]);
-            lines.push(format!("stiffness_mn_per_mm = {}", number(*stiffness_mn_per_mm)));
+            lines.push(match tie {
+                TieSpec::Spring { stiffness_mn_per_mm } => {
+                    format!("stiffness_mn_per_mm = {}", number(*stiffness_mn_per_mm))
+                }
+                TieSpec::Rigid => "rigid = true".into(),
+            });
+            lines.extend(bone_line(bone));
         }
         if !controls.is_empty() {
             lines.push("\n[controls]".into());
@@ -218,9 +226,29 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
     ]);
 }
 
+fn bone_lines(bone: &BoneSpec, lines: &mut Vec<String>) {
+    let BoneSpec { name, hinge, slide, place: _ } = bone;
+    lines.extend(["\n[[bone]]".into(), format!("name = {}", text(name))]);
+    lines.extend(hinge.map(|HingeSpec { axis, through_mm, bounds_deg }| {
+        let (axis, through_mm) = (numbers(&axis), numbers(&through_mm));
+        format!("hinge = {{ axis = {axis}, through_mm = {through_mm}, bounds_deg = {bounds_deg:?} }}")
+    }));
+    lines.extend(slide.map(|SlideSpec { direction, bounds_mm }| {
+        format!("slide = {{ direction = {}, bounds_mm = {bounds_mm:?} }}", numbers(&direction))
+    }));
+}
+
+/// `bone = ...` where something is tied to one.
+fn bone_line(bone: &Option<String>) -> Option<String> {
+    bone.as_ref().map(|bone| format!("bone = {}", text(bone)))
+}
+
 fn support_line(kind: &SupportKind) -> String {
     match kind {
-        SupportKind::Clamp { face } => format!("clamp = {{ face = {} }}", faces(face)),
+        SupportKind::Clamp { face, bone } => {
+            let bone = bone_line(bone).map(|line| format!(", {line}")).unwrap_or_default();
+            format!("clamp = {{ face = {}{bone} }}", faces(face))
+        }
         SupportKind::Symmetry { face } => format!("symmetry = {{ face = {} }}", faces(face)),
         SupportKind::Plate { face, offset_mm } => {
             format!("plate = {{ face = {}, offset_mm = {} }}", faces(face), number(*offset_mm))
@@ -236,7 +264,7 @@ fn support_line(kind: &SupportKind) -> String {
 }
 
 fn contact_lines(kind: &str, contact: &ContactSpec, lines: &mut Vec<String>) {
-    let ContactSpec { name, face, surface, law, initial, gauss, place: _ } = contact;
+    let ContactSpec { name, face, surface, bone, law, initial, gauss, place: _ } = contact;
     let initial = match initial {
         InitialSpec::Refuse => "refuse",
         InitialSpec::Relax => "relax",
@@ -250,6 +278,7 @@ fn contact_lines(kind: &str, contact: &ContactSpec, lines: &mut Vec<String>) {
         format!("initial = \"{initial}\""),
         format!("gauss = {gauss}"),
     ]);
+    lines.extend(bone_line(bone));
 }
 
 fn surface_entry(surface: &SurfaceSpec) -> String {

@@ -7,6 +7,7 @@
 //! [`Scene::read`] reads a file, merges `--set` overrides into it before anything is checked, and [`Scene::lock`]
 //! writes the result with nothing left unsaid.
 
+mod bones;
 mod contacts;
 mod cursor;
 mod curves;
@@ -17,11 +18,13 @@ mod nearest;
 mod overrides;
 mod references;
 mod spec;
+mod study;
 mod tree;
 mod units;
 
 pub use curves::Curves;
 pub use spec::*;
+pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};
 pub use units::Units;
 
 use crate::error::{Error, Result, Warning};
@@ -50,6 +53,8 @@ pub struct Scene {
     pub regions: Vec<RegionSpec>,
     /// The muscles in it.
     pub muscles: Vec<MuscleSpec>,
+    /// Rigid bodies that move, and carry what is tied to them.
+    pub bones: Vec<BoneSpec>,
     /// What holds or moves its surface.
     pub supports: Vec<SupportSpec>,
     /// Faces that stay on a surface and slide along it.
@@ -58,9 +63,9 @@ pub struct Scene {
     pub contacts: Vec<ContactSpec>,
     /// The forces on it.
     pub loads: Vec<LoadSpec>,
-    /// Points of it that springs hold.
+    /// Points of it that are tied to space or to a bone.
     pub attachments: Vec<AttachmentSpec>,
-    /// Activations, in the order of the file; a muscle without one rests at 0.
+    /// Activations and poses of bones, in the order of the file; what has none rests at 0.
     pub controls: Vec<ControlSpec>,
     /// Points whose motion is written down.
     pub probes: Vec<ProbeSpec>,
@@ -96,11 +101,16 @@ impl Scene {
     /// # Errors
     /// [`Error::Io`] if the file cannot be read, otherwise every mistake in it and in the overrides.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Scene> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
-        let file = path.display().to_string();
-        let text = String::from_utf8(bytes).map_err(|error| not_unicode(&file, &error))?;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        interpret_text(&text, &file, folder, overrides, true)
+        Scene::read_changed(path, overrides, &[])
+    }
+
+    /// As [`Scene::read`], without the keys and tables that `without` names, for example `contact.table`.
+    ///
+    /// # Errors
+    /// As [`Scene::read`]; something named that is not there.
+    pub fn read_changed(path: &Path, overrides: &[String], without: &[String]) -> Result<Scene> {
+        let file = File::read(path)?;
+        interpret_text(&file.text, &file.name, file.folder, (overrides, without), true)
     }
 
     /// Reads a problem from a text, without looking at any other file. `file` is what messages call it, and relative
@@ -109,8 +119,80 @@ impl Scene {
     /// # Errors
     /// Every mistake in the text and in the overrides.
     pub fn parse(text: &str, file: &str, folder: &Path, overrides: &[String]) -> Result<Scene> {
-        interpret_text(text, file, folder, overrides, false)
+        interpret_text(text, file, folder, (overrides, &[]), false)
     }
+
+    /// What the controls of the scene may be: the muscles, then the bones.
+    pub fn control_ranges(&self) -> Vec<ControlRange> {
+        let muscles = self.muscles.iter().map(|muscle| ControlRange::activation(&muscle.name));
+        muscles.chain(self.bones.iter().flat_map(ControlRange::of_bone)).collect()
+    }
+
+    /// Whether a bone carries anything.
+    fn carries(&self, bone: &BoneSpec) -> bool {
+        let clamped = self.supports.iter().filter_map(|support| match &support.kind {
+            SupportKind::Clamp { bone, .. } => bone.as_ref(),
+            _ => None,
+        });
+        let met = self.slidings.iter().chain(&self.contacts).filter_map(|contact| contact.bone.as_ref());
+        let tied = self.attachments.iter().filter_map(|attachment| attachment.bone.as_ref());
+        clamped.chain(met).chain(tied).any(|name| *name == bone.name)
+    }
+}
+
+/// What a file asks for.
+pub enum Problem {
+    /// To solve one problem.
+    Scene(Box<Scene>),
+    /// To solve a problem in many ways.
+    Study(Box<Study>),
+}
+
+impl Problem {
+    /// Reads a file; overrides as for [`Scene::read`].
+    ///
+    /// # Errors
+    /// As [`Scene::read`].
+    pub fn read(path: &Path, overrides: &[String]) -> Result<Problem> {
+        let file = File::read(path)?;
+        let mut root = Source::new(&file.name, &file.text).tree().map_err(Error::all)?;
+        if !study::is_study(&root) {
+            return Scene::read(path, overrides).map(|scene| Problem::Scene(Box::new(scene)));
+        }
+        let mistakes = Mistakes::default();
+        for (index, argument) in overrides.iter().enumerate() {
+            if let Err(mistake) = overrides::apply(&mut root, argument, index + 1) {
+                mistakes.add(mistake);
+            }
+        }
+        let folder = absolute(file.folder)?;
+        let study = study::study(&root, &default_name(&file.name, &folder), &folder, &mistakes);
+        match (study, mistakes.sorted(&file.name)) {
+            (Some(study), mistakes) if mistakes.is_empty() => Ok(Problem::Study(Box::new(study))),
+            (_, mistakes) => Err(Error::all(mistakes)),
+        }
+    }
+}
+
+/// A problem file as text.
+struct File<'p> {
+    name: String,
+    text: String,
+    folder: &'p Path,
+}
+
+impl File<'_> {
+    fn read(path: &Path) -> Result<File<'_>> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
+        let name = path.display().to_string();
+        let text = String::from_utf8(bytes).map_err(|error| not_unicode(&name, &error))?;
+        Ok(File { name, text, folder: path.parent().unwrap_or(Path::new("")) })
+    }
+}
+
+fn absolute(folder: &Path) -> Result<PathBuf> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    std::path::absolute(folder).map_err(|source| Error::Io { action: "find", path: folder.into(), source })
 }
 
 fn not_unicode(file: &str, error: &std::string::FromUtf8Error) -> Error {
@@ -120,10 +202,14 @@ fn not_unicode(file: &str, error: &std::string::FromUtf8Error) -> Error {
     Error::Syntax { message: "it is not UTF-8 text".into(), place }
 }
 
-fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], on_disk: bool) -> Result<Scene> {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let folder =
-        std::path::absolute(folder).map_err(|source| Error::Io { action: "find", path: folder.into(), source })?;
+fn interpret_text(
+    text: &str,
+    file: &str,
+    folder: &Path,
+    (overrides, without): (&[String], &[String]),
+    on_disk: bool,
+) -> Result<Scene> {
+    let folder = absolute(folder)?;
     let mut root = Source::new(file, text).tree().map_err(Error::all)?;
     let mistakes = Mistakes::default();
     flatten_controls(&mut root);
@@ -133,9 +219,15 @@ fn interpret_text(text: &str, file: &str, folder: &Path, overrides: &[String], o
         }
         flatten_controls(&mut root);
     }
-    for kind in ["muscle", "region", "probe", "marker", "sliding", "contact"] {
+    for path in without {
+        if let Err(mistake) = overrides::remove(&mut root, path) {
+            mistakes.add(mistake);
+        }
+    }
+    for kind in ["muscle", "region", "bone", "probe", "marker", "sliding", "contact"] {
         unique_names(&root, kind, &mistakes);
     }
+    bones::known(&root, &mistakes);
     let references = References::new(&root, &folder, on_disk);
     let scene = interpret::scene(&root, &default_name(file, &folder), &references, &mistakes);
     let mistakes = mistakes.sorted(file);
@@ -191,6 +283,14 @@ fn warnings(scene: &Scene, file: &Arc<str>) -> Vec<Warning> {
                 .into(),
             place: Some(load.place.clone()),
             help: Some("write sensitivity = \"finite-difference\" in [fit] if the fit is slow or stalls".into()),
+        });
+    }
+    for bone in scene.bones.iter().filter(|bone| !scene.carries(bone)) {
+        warnings.push(Warning {
+            code: "C021",
+            message: format!("nothing is tied to the bone `{}`: its motion changes nothing", bone.name),
+            place: Some(bone.place.clone()),
+            help: Some(format!("write bone = \"{}\" in a clamp, sliding, contact or attachment", bone.name)),
         });
     }
     if let (Some(marker), Task::Forward) = (scene.markers.first(), scene.task) {

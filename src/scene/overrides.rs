@@ -6,6 +6,7 @@ use crate::error::{Error, Place, Result};
 use std::ops::Range;
 
 const EXAMPLE: &str = "write it like --set solver.step_max=0.02 or --set muscle.slab.gauss=4";
+const WITHOUT: &str = "write it like without = [\"muscle.slab\"] or without = [\"load[0]\"]";
 const PREFIX: &str = "--set ";
 
 /// Merges `argument` (`key=value`), the `number`th of the command line (from 1), into the tree.
@@ -14,6 +15,42 @@ pub(super) fn apply(root: &mut Node, argument: &str, number: usize) -> Result<()
     let steps = line.steps()?;
     let value = line.value()?;
     put(root, &steps, "", value, &line)
+}
+
+/// Takes away what `path` names, for example `contact.table` or `load[0]`.
+pub(super) fn remove(root: &mut Node, path: &str) -> Result<()> {
+    let line = Line { text: format!("{PREFIX}{path}="), number: 1 };
+    let steps = line.steps()?;
+    let nothing = || {
+        line.mistake(
+            PREFIX.len()..PREFIX.len() + path.len(),
+            format!("there is no `{path}` to take away"),
+            WITHOUT.into(),
+        )
+    };
+    let (last, before) = steps.split_last().ok_or_else(nothing)?;
+    let mut node = root;
+    for step in before {
+        node = step.within(node).ok_or_else(nothing)?;
+    }
+    let found = match (last, &mut node.value) {
+        (Step::Key(key, _), Value::Table(entries)) => {
+            let count = entries.len();
+            entries.retain(|entry| entry.key != *key);
+            entries.len() < count
+        }
+        (Step::Key(name, _), Value::List(list)) => {
+            let count = list.len();
+            list.retain(|node| node.name().is_none_or(|(named, _)| named != name));
+            list.len() < count
+        }
+        (Step::Index(index, _), Value::List(list)) if *index < list.len() => {
+            list.remove(*index);
+            true
+        }
+        _ => false,
+    };
+    if found { Ok(()) } else { Err(nothing()) }
 }
 
 /// A part of the path to a value.
@@ -26,6 +63,22 @@ enum Step {
 struct Line {
     text: String,
     number: usize,
+}
+
+impl Step {
+    /// What this step leads to.
+    fn within<'n>(&self, node: &'n mut Node) -> Option<&'n mut Node> {
+        match (self, &mut node.value) {
+            (Step::Key(key, _), Value::Table(entries)) => {
+                entries.iter_mut().find(|entry| entry.key == *key).map(|entry| &mut entry.node)
+            }
+            (Step::Key(name, _), Value::List(list)) => {
+                list.iter_mut().find(|node| node.name().is_some_and(|(named, _)| named == name))
+            }
+            (Step::Index(index, _), Value::List(list)) => list.get_mut(*index),
+            (Step::Index(..), _) | (Step::Key(..), _) => None,
+        }
+    }
 }
 
 impl Line {

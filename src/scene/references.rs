@@ -1,9 +1,13 @@
-//! What a problem refers to: muscles by their names, files by their paths.
+//! What a problem refers to: muscles and bones by the names of their controls, files by their paths.
 
 use super::Curves;
-use super::cursor::{ACTIVATION, Item, Mistakes};
+use super::bones;
+use super::cursor::{ACTIVATION, FINITE, Item, Mistakes};
+use super::curves::what;
 use super::nearest::nearest;
-use super::spec::{ActivationSpec, ControlSpec, ControlValue, GeometrySpec, MuscleSpec};
+use super::spec::{
+    ActivationSpec, BoneSpec, ControlKind, ControlRange, ControlSpec, ControlValue, GeometrySpec, MuscleSpec,
+};
 use super::tree::{Entry, Node, Value};
 use crate::error::{Error, Place};
 use std::cell::RefCell;
@@ -14,6 +18,8 @@ use std::path::{Path, PathBuf};
 pub(super) struct References {
     folder: PathBuf,
     muscles: Vec<String>,
+    /// The controls of bones.
+    bones: Vec<String>,
     /// Whether files must exist.
     on_disk: bool,
     /// The columns of the tables of curves read so far; `None` for one with mistakes.
@@ -21,7 +27,7 @@ pub(super) struct References {
 }
 
 impl References {
-    /// The muscles are those of the tree, even where the rest of their table is mistaken.
+    /// The muscles and bones are those of the tree, even where the rest of their table is mistaken.
     pub fn new(root: &Node, folder: &Path, on_disk: bool) -> References {
         let mut muscles: Vec<String> = Vec::new();
         for (name, _) in root.tables("muscle").iter().filter_map(Node::name) {
@@ -29,7 +35,8 @@ impl References {
                 muscles.push(name.into());
             }
         }
-        References { folder: folder.into(), muscles, on_disk, columns: RefCell::default() }
+        let bones = bones::controls(root);
+        References { folder: folder.into(), muscles, bones, on_disk, columns: RefCell::default() }
     }
 
     pub fn folder(&self) -> &Path {
@@ -41,22 +48,43 @@ impl References {
         self.muscles.clone()
     }
 
-    /// Notes if `name` is not a muscle.
-    fn muscle(&self, name: &str, place: &Place, mistakes: &Mistakes) -> Option<()> {
-        if self.muscles.iter().any(|muscle| muscle == name) {
+    /// Whether there are bones that can be controlled.
+    pub fn has_bones(&self) -> bool {
+        !self.bones.is_empty()
+    }
+
+    /// What all controls may be. The specs of the bones are absent where one of them is mistaken; then their controls may be
+    /// anything.
+    fn ranges(&self, specs: Option<&[BoneSpec]>) -> Vec<ControlRange> {
+        let anything = |name: &String| {
+            let (name, kind) = (name.clone(), ControlKind::Slide);
+            ControlRange { name, kind, lower: f64::NEG_INFINITY, upper: f64::INFINITY }
+        };
+        let bones = match specs {
+            Some(specs) => specs.iter().flat_map(ControlRange::of_bone).collect(),
+            None => self.bones.iter().map(anything).collect::<Vec<_>>(),
+        };
+        self.muscles.iter().map(|name| ControlRange::activation(name)).chain(bones).collect()
+    }
+
+    /// Notes if `name` is that of no control.
+    fn control(&self, name: &str, place: &Place, mistakes: &Mistakes) -> Option<()> {
+        let all: Vec<String> = self.muscles.iter().chain(&self.bones).cloned().collect();
+        if all.iter().any(|known| known == name) {
             return Some(());
         }
-        let help = help_for_name(name, &self.muscles, "muscles");
-        mistakes.add(Error::UnknownName { kind: "muscle", name: name.into(), help, place: place.clone() });
+        let (kind, kinds) = what(&self.ranges(None));
+        let help = help_for_name(name, &all, kinds);
+        mistakes.add(Error::UnknownName { kind, name: name.into(), help, place: place.clone() });
         None
     }
 
-    /// `[fit] unknowns`: names of muscles, each once.
+    /// `[fit] unknowns`: names of controls, each once.
     pub fn unknowns(&self, item: &Item) -> Option<Vec<String>> {
         let mut seen: Vec<(String, u32)> = Vec::new();
         let names = item.list("a list of names of muscles", |entry| {
             let (name, place) = (entry.name()?, &entry.node.place);
-            self.muscle(&name, place, entry.mistakes)?;
+            self.control(&name, place, entry.mistakes)?;
             first_use("unknown", &name, place, &mut seen, entry.mistakes)?;
             Some(name)
         })?;
@@ -66,27 +94,40 @@ impl References {
         Some(names)
     }
 
-    /// `[controls]`: a value for each named muscle, or a list with one for each node of a field. The specs of the muscles
-    /// tell which is which; they are absent where one of them is mistaken.
-    pub fn controls(&self, item: &Item, muscles: Option<&[MuscleSpec]>) -> Option<Vec<ControlSpec>> {
+    /// `[controls]`: a value for each named muscle, or a list with one for each node of a field; angles and ways of bones.
+    /// The specs of muscles and bones tell which is which; they are absent where one of them is mistaken.
+    pub fn controls(
+        &self,
+        item: &Item,
+        muscles: Option<&[MuscleSpec]>,
+        bones: Option<&[BoneSpec]>,
+    ) -> Option<Vec<ControlSpec>> {
         let Some(entries) = item.node.entries() else {
             // The type is wrong, which `table` notes.
             return item.table(|_| None);
         };
+        let ranges = self.ranges(bones);
         let mut seen = Vec::new();
         let read = |Entry { key: name, place, node }: &Entry| {
             let control = Item { node, path: format!("controls.{name}"), mistakes: item.mistakes };
-            let known = self.muscle(name, place, item.mistakes);
+            let known = self.control(name, place, item.mistakes);
+            let of_bone = ranges.iter().find(|range| range.name == *name && range.kind != ControlKind::Activation);
             let first = first_use("control", name, place, &mut seen, item.mistakes);
             let value = match node.value {
                 Value::Table(_) => control.table(|table| {
                     let path = table.required("csv", "csv = \"curves.csv\"", |item| self.file(&item))?;
-                    known.and_then(|()| self.column(&path, name, &control)).map(|()| ControlValue::Csv(path))
+                    known.and_then(|()| self.column(&path, name, &ranges, &control)).map(|()| ControlValue::Csv(path))
                 }),
-                Value::List(_) => {
+                Value::List(_) if of_bone.is_none() => {
                     nodes(&control, muscles.and_then(|all| all.iter().find(|muscle| muscle.name == *name)))
                 }
-                _ => control.number(ACTIVATION).map(ControlValue::Constant),
+                _ => match of_bone {
+                    Some(range) => pose(&control, range),
+                    None if known.is_some() => control.number(ACTIVATION),
+                    // of what is not known nothing is known
+                    None => control.number(FINITE),
+                }
+                .map(ControlValue::Constant),
             };
             known?;
             first?;
@@ -111,12 +152,12 @@ impl References {
     }
 
     /// Reads a table of curves once, and notes if it has no column for this control.
-    fn column(&self, path: &Path, name: &str, control: &Item) -> Option<()> {
+    fn column(&self, path: &Path, name: &str, ranges: &[ControlRange], control: &Item) -> Option<()> {
         if !self.on_disk {
             return Some(());
         }
         let mut read = self.columns.borrow_mut();
-        let columns = read.entry(path.into()).or_insert_with(|| match Curves::read(path, &self.muscles) {
+        let columns = read.entry(path.into()).or_insert_with(|| match Curves::read(path, ranges) {
             Ok(curves) => Some(curves.names),
             Err(Error::Mistakes(mistakes)) => {
                 mistakes.into_iter().for_each(|mistake| control.mistakes.add(mistake));
@@ -136,6 +177,16 @@ impl References {
         control.mistakes.add(Error::UnknownName { kind: "column", name: name.into(), help, place });
         None
     }
+}
+
+/// The angle or way of a bone, within its bounds.
+fn pose(control: &Item, range: &ControlRange) -> Option<f64> {
+    let value = control.number(FINITE)?;
+    if range.holds(value) {
+        return Some(value);
+    }
+    let unit = range.kind.unit();
+    control.out_of_range(&format!("{value:?} {unit}"), &range.allowed())
 }
 
 /// The activations of a field at its nodes.

@@ -252,10 +252,12 @@ pub struct SupportSpec {
 #[derive(Debug, Clone, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SupportKind {
-    /// The face does not move.
+    /// The face does not move, or moves as a part of a bone.
     Clamp {
         /// The face.
         face: FaceSpec,
+        /// The bone that it is grown to; without one it is held in space.
+        bone: Option<String>,
     },
     /// The face does not move along its normal.
     Symmetry {
@@ -348,6 +350,8 @@ pub struct ContactSpec {
     pub face: FaceSpec,
     /// What it meets.
     pub surface: SurfaceSpec,
+    /// The bone that carries the surface; without one it stays where it is.
+    pub bone: Option<String>,
     /// What keeps the gap.
     pub law: ContactLawSpec,
     /// What becomes of a reference shape that violates it.
@@ -510,24 +514,141 @@ pub enum LoadKind {
     },
 }
 
-/// A material point tied by a spring to where it was before anything moved: `[[attachment]]`.
+/// A material point tied to a bone, or to where it was before anything moved: `[[attachment]]`.
 #[derive(Debug, Clone, Serialize)]
 pub struct AttachmentSpec {
     /// Where the point is before anything moves, mm.
     pub position_mm: [f64; 3],
-    /// Force per motion, mN/mm.
-    pub stiffness_mn_per_mm: f64,
+    /// How it is tied.
+    pub tie: TieSpec,
+    /// The bone; without one it is tied to space.
+    pub bone: Option<String>,
     /// The table in the file.
     #[serde(skip)]
     pub place: Place,
 }
 
-/// The activation of a muscle: one line of `[controls]`. A muscle without one rests at 0.
+/// How a point is tied.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TieSpec {
+    /// By a spring.
+    Spring {
+        /// Force per elongation, mN/mm.
+        stiffness_mn_per_mm: f64,
+    },
+    /// `rigid = true`: it does not move against what it is tied to.
+    Rigid,
+}
+
+/// A rigid body that moves: `[[bone]]`. It has a hinge, a slide or both: it turns, then it slides, its hinge with it.
+#[derive(Debug, Clone, Serialize)]
+pub struct BoneSpec {
+    /// Its name, unique among bones; its controls are `<name>.hinge` and `<name>.slide`.
+    pub name: String,
+    /// How it turns.
+    pub hinge: Option<HingeSpec>,
+    /// How it slides.
+    pub slide: Option<SlideSpec>,
+    /// The table in the file.
+    #[serde(skip)]
+    pub place: Place,
+}
+
+/// A rotation about an axis, by the right-hand rule: `hinge` of a bone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HingeSpec {
+    /// The axis; any length but 0.
+    pub axis: [f64; 3],
+    /// A point of the axis before anything moves, mm.
+    pub through_mm: [f64; 3],
+    /// The smallest and the greatest angle, degrees; 0 is between them.
+    pub bounds_deg: [f64; 2],
+}
+
+/// A translation along a line: `slide` of a bone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SlideSpec {
+    /// The direction, fixed in space; any length but 0.
+    pub direction: [f64; 3],
+    /// The smallest and the greatest way, mm; 0 is between them.
+    pub bounds_mm: [f64; 2],
+}
+
+/// What a control may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControlRange {
+    /// Its name: that of a muscle, or `<bone>.hinge`, `<bone>.slide`.
+    pub name: String,
+    /// What it is.
+    pub kind: ControlKind,
+    /// Smallest value.
+    pub lower: f64,
+    /// Greatest value.
+    pub upper: f64,
+}
+
+/// What a control is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ControlKind {
+    /// An activation, without a unit.
+    Activation,
+    /// The angle of a hinge, degrees.
+    Hinge,
+    /// The way of a slide, mm.
+    Slide,
+}
+
+impl ControlRange {
+    /// The range of the activation of a muscle, from 0 to 1.
+    pub fn activation(name: &str) -> ControlRange {
+        ControlRange { name: name.to_owned(), kind: ControlKind::Activation, lower: 0.0, upper: 1.0 }
+    }
+
+    /// The ranges of the controls of a bone: hinge, then slide.
+    pub fn of_bone(bone: &BoneSpec) -> Vec<ControlRange> {
+        let range = |way: &str, kind, [lower, upper]: [f64; 2]| {
+            let name = format!("{}.{way}", bone.name);
+            ControlRange { name, kind, lower, upper }
+        };
+        let hinge = bone.hinge.map(|hinge| range("hinge", ControlKind::Hinge, hinge.bounds_deg));
+        let slide = bone.slide.map(|slide| range("slide", ControlKind::Slide, slide.bounds_mm));
+        hinge.into_iter().chain(slide).collect()
+    }
+
+    /// Whether a value is in it.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.lower..=self.upper).contains(&value)
+    }
+
+    /// The range in words that follow "it must be".
+    pub fn allowed(&self) -> String {
+        match self.kind {
+            ControlKind::Activation => "an activation from 0 to 1".into(),
+            ControlKind::Hinge | ControlKind::Slide => {
+                format!("from {:?} to {:?} {}, the bounds of its bone", self.lower, self.upper, self.kind.unit())
+            }
+        }
+    }
+}
+
+impl ControlKind {
+    /// The unit of its values: none, `deg` or `mm`.
+    pub fn unit(self) -> &'static str {
+        match self {
+            ControlKind::Activation => "",
+            ControlKind::Hinge => "deg",
+            ControlKind::Slide => "mm",
+        }
+    }
+}
+
+/// The activation of a muscle, or the pose of a bone: one line of `[controls]`. What has none rests at 0.
 ///
-/// In a fit, the control of a muscle that is not among the unknowns holds; that of an unknown is found, not read.
+/// In a fit, a control that is not among the unknowns holds; that of an unknown is found, not read.
 #[derive(Debug, Clone, Serialize)]
 pub struct ControlSpec {
-    /// The muscle.
+    /// The muscle, or `<bone>.hinge`, `<bone>.slide`.
     pub name: String,
     /// How much.
     pub value: ControlValue,
@@ -536,7 +657,7 @@ pub struct ControlSpec {
     pub place: Place,
 }
 
-/// An activation, from 0 (at rest) to 1 (all it can).
+/// An activation, from 0 (at rest) to 1 (all it can), an angle in degrees, or a way in mm.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControlValue {
@@ -544,12 +665,12 @@ pub enum ControlValue {
     Constant(f64),
     /// The same at all times, one for every node of a field: x fastest, then y, then z.
     Nodes(Vec<f64>),
-    /// The column with the name of the muscle in a table over time, see [`Curves`](super::Curves).
+    /// The column with the name of the control in a table over time, see [`Curves`](super::Curves).
     Csv(PathBuf),
 }
 
 impl ControlValue {
-    /// The values of so many controls of a muscle, unless they change over time.
+    /// The values of so many controls of one name, unless they change over time.
     pub fn constants(&self, controls: usize) -> Option<Vec<f64>> {
         match self {
             ControlValue::Constant(value) => Some(vec![*value; controls]),
@@ -596,7 +717,7 @@ pub struct FitSpec {
     pub topic: Option<String>,
     /// How the derivative of marker positions by activations is found.
     pub sensitivity: SensitivitySpec,
-    /// The muscles whose activation is sought, in the order of the file; by default all of them.
+    /// The controls that are sought: muscles, `<bone>.hinge`, `<bone>.slide`; by default all muscles and no bone.
     pub unknowns: Vec<String>,
     /// Whether a sample at exactly (0, 0, 0) is a lost marker.
     pub zero_is_missing: bool,
@@ -610,12 +731,12 @@ pub struct FitSpec {
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.
     pub frames: FramesSpec,
-    /// The change of the activations at which the search ends; the step that shows it is still taken.
+    /// The change of the controls, as a part of their range, at which the search ends; the step that shows it is still taken.
     pub tolerance: f64,
     /// The most Gauss-Newton steps per frame.
     pub max_iterations: usize,
     /// The step of finite differences in relation to (activation + onset), the onset being the shear modulus of the
-    /// tissue over sigma_max.
+    /// tissue over sigma_max; of a bone, in relation to ten times its range.
     pub finite_difference_step: f64,
     /// The table in the file.
     #[serde(skip)]

@@ -56,6 +56,25 @@ impl Node {
         }
     }
 
+    /// The value as TOML on one line.
+    pub fn to_toml(&self) -> String {
+        let key = |key: &str| match key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
+            true if !key.is_empty() => key.to_owned(),
+            _ => format!("{key:?}"),
+        };
+        match &self.value {
+            Value::Text(text) => format!("{text:?}"),
+            Value::Number { written, .. } => written.clone(),
+            Value::Flag(flag) => flag.to_string(),
+            Value::Date => "\"a date\"".into(),
+            Value::List(list) => format!("[{}]", list.iter().map(Node::to_toml).collect::<Vec<_>>().join(", ")),
+            Value::Table(entries) => {
+                let entry = |e: &Entry| format!("{} = {}", key(&e.key), e.node.to_toml());
+                format!("{{ {} }}", entries.iter().map(entry).collect::<Vec<_>>().join(", "))
+            }
+        }
+    }
+
     /// The entries, if this is a table.
     pub fn entries(&self) -> Option<&[Entry]> {
         match &self.value {

@@ -4,6 +4,7 @@
 //! stiffness K = dr/d(u, p) to the small system of one element, which the model then assembles. What acts between
 //! elements is a [`coupling`].
 
+pub mod bone;
 pub mod constraint;
 pub mod contact;
 pub mod coupling;
@@ -11,6 +12,7 @@ pub mod load;
 pub mod muscle;
 pub mod pressure;
 pub mod spring;
+pub mod tie;
 pub mod tissue;
 
 use crate::material::PAIRS;
@@ -29,7 +31,7 @@ pub struct ElementState<'a> {
     pub u: &'a [[f64; 64]; 3],
     /// Local pressure parameters, kPa; unused ones are zero.
     pub p: &'a [f64; MAX_PRESSURES],
-    /// All controls of the model, for example activations.
+    /// All controls of the model: activations, poses of bones.
     pub controls: &'a [f64],
     /// Factor on loads, 0 to 1 along the load path.
     pub load: f64,
@@ -124,7 +126,7 @@ pub trait Term: Send + Sync {
         &[]
     }
 
-    /// Adds dr/d(control), the force per unit of a control (for an activation: mN), in one element.
+    /// Adds dr/d(control), the force per unit of a control (for an activation: mN, for a hinge: mN per degree), in one element.
     fn add_control_force(&self, _control: usize, _state: &ElementState<'_>, _force: &mut [[f64; 64]; 3]) {}
 
     /// Adds dr/d(load) in one element. Zero for a term that does not depend on the load factor.
@@ -155,6 +157,11 @@ pub trait Term: Send + Sync {
 
     /// The term as a coupling, if it acts between elements and not within them.
     fn as_coupling(&self) -> Option<&dyn coupling::Coupling> {
+        None
+    }
+
+    /// The term as something that a bone may carry.
+    fn as_carried(&self) -> Option<&dyn bone::Carried> {
         None
     }
 

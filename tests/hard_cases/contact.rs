@@ -55,7 +55,8 @@ fn contact_at_few_points_opens_and_closes_without_chatter() {
                 assert!(drift < if name == "augmented" { 1e-3 } else { 1e-6 }, "{name}: drifted by {drift:.1e}");
             }
             first.get_or_insert(pressed.state.clone());
-            let lifted = stable(&format!("{name}: lifted, round {round}"), &mut solver, &pressed.state, &drive(&[], -1.0));
+            let lifted =
+                stable(&format!("{name}: lifted, round {round}"), &mut solver, &pressed.state, &drive(&[], -1.0));
             let contact = contact_states(&model, &lifted.state)[0];
             assert_eq!((contact.area, contact.max_pressure), (0.0, 0.0), "{name}: {contact:?}");
             state = lifted.state;

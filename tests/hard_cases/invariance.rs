@@ -62,14 +62,31 @@ law = {{ {law} }}
 [controls]
 slab = 0.05
 "#,
-        30.0 * l, 10.0 * l, 10.0 * l,
-        0.5 * s, 0.2 * s, 10.0 * s,
-        3.0 * l, 1.0 * l, 6.0 * l, 24.0 * l, 8.0 * l, 3.0 * l,
+        30.0 * l,
+        10.0 * l,
+        10.0 * l,
+        0.5 * s,
+        0.2 * s,
+        10.0 * s,
+        3.0 * l,
+        1.0 * l,
+        6.0 * l,
+        24.0 * l,
+        8.0 * l,
+        3.0 * l,
         300.0 * s,
         -4.0 * s / l,
-        0.01 * s, 0.005 * s, 0.002 * s / l,
-        30.0 * l, 5.0 * l, 5.0 * l, 0.1 * s * l,
-        26.0 * l, 5.0 * l, 30.2 * l, 20.0 * l,
+        0.01 * s,
+        0.005 * s,
+        0.002 * s / l,
+        30.0 * l,
+        5.0 * l,
+        5.0 * l,
+        0.1 * s * l,
+        26.0 * l,
+        5.0 * l,
+        30.2 * l,
+        20.0 * l,
     );
     Scene::parse(&text, "scaled.toml", Path::new("."), &[]).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -125,7 +142,8 @@ law = {{ penalty = {{ kpa_per_mm = 5 }} }}
                 10.0 * l,
                 10.0 * l * depth
             );
-            let scene = Scene::parse(&text, "gap.toml", Path::new("."), &[]).unwrap_or_else(|error| panic!("{error}"));
+            let scene =
+                Scene::parse(&text, "gap.toml", Path::new("."), &[]).unwrap_or_else(|error| panic!("{error}"));
             let built = build(&scene).map(|_| ());
             assert_eq!(built.is_err(), refused, "length {l:e}, gap {depth:e}: {built:?}");
         }

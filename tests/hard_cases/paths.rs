@@ -44,7 +44,8 @@ fn two_hundred_load_reversals_do_not_drift() {
     let mut state = first.clone();
     for reversal in 0..199 {
         let load = if reversal % 2 == 0 { -1.0 } else { 1.0 };
-        let found = solver.equilibrium(&state, &drive(&[], load)).unwrap_or_else(|failure| panic!("{}", failure.error));
+        let found =
+            solver.equilibrium(&state, &drive(&[], load)).unwrap_or_else(|failure| panic!("{}", failure.error));
         assert_eq!(found.negative_modes, Some(0));
         state = found.state;
     }
@@ -70,7 +71,8 @@ fn inverted_trial_states_are_left() {
     let near = near.unwrap_or_else(|failure| panic!("{}", failure.error));
     assert_in_balance("from rest", &model, &near.state);
     // from an inverted guess: the path is walked instead
-    let from = solver.equilibrium_near(&full, &model.rest(), &to).unwrap_or_else(|failure| panic!("{}", failure.error));
+    let from =
+        solver.equilibrium_near(&full, &model.rest(), &to).unwrap_or_else(|failure| panic!("{}", failure.error));
     assert_in_balance("from an inverted guess", &model, &from.state);
     let walked = stable("slab at 0.2 beside an inverted guess", &mut solver, &model.rest(), &to);
     assert!(difference(&walked.state, &near.state).max(difference(&walked.state, &from.state)) < 1e-6);
@@ -100,7 +102,10 @@ fn a_load_out_of_reach_is_refused_with_its_numbers() {
             };
             assert!((0.0..1.0).contains(&reached) && reached == failure.reached, "reached {reached}");
             assert!(cuts > 0 && step < solver.settings().step_min, "{cuts} cuts, step {step}");
-            assert!(element < 2 && point < 64 && det_f.is_finite(), "element {element}, point {point}, det F {det_f}");
+            assert!(
+                element < 2 && point < 64 && det_f.is_finite(),
+                "element {element}, point {point}, det F {det_f}"
+            );
             assert!(residual.is_nan() || residual > required, "residual {residual}, required {required}");
             assert_eq!(failure.last_good.load, reached);
             let kinds: Vec<StepKind> = failure.history.iter().map(|step| step.kind).collect();
@@ -135,8 +140,11 @@ traction = { face = "xi1=0", kpa = [0.6, 0, 0] }
     let scene = Scene::parse(text, "off.toml", Path::new("."), &[]).unwrap_or_else(|error| panic!("{error}"));
     let model = build(&scene).unwrap_or_else(|error| panic!("{error}")).model;
     let mut solver = solver(&model);
-    let failure = attempt("slid off its surface", &mut solver, &model.rest(), &drive(&[], 1.0)).expect_err("it is off");
-    let Error::NotConverged { likely: Some(likely), reached, .. } = &failure.error else { panic!("{}", failure.error) };
+    let failure =
+        attempt("slid off its surface", &mut solver, &model.rest(), &drive(&[], 1.0)).expect_err("it is off");
+    let Error::NotConverged { likely: Some(likely), reached, .. } = &failure.error else {
+        panic!("{}", failure.error)
+    };
     let Likely::OffSurface { name, position, .. } = &**likely else { panic!("{likely}") };
     assert_eq!(name, "deep fascia");
     // patches end an element, 10 mm, beyond their edge

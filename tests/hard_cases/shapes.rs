@@ -52,10 +52,9 @@ fn a_beam_is_twisted_by_half_a_turn_and_by_a_whole_one() {
 fn sag(model: &Model, found: &Equilibrium) -> f64 {
     let last = model.mesh().elements() - 1;
     let at = |y: f64, z: f64| {
-        let before = model.mesh().interpolate(
-            risorius::mesh::MaterialPoint { element: last, xi: [1.0, y, z] },
-            &model.mesh().parameters,
-        );
+        let before = model
+            .mesh()
+            .interpolate(risorius::mesh::MaterialPoint { element: last, xi: [1.0, y, z] }, &model.mesh().parameters);
         before[2] - moved(model, found, last, [1.0, y, z])[2]
     };
     0.25 * (at(0.0, 0.0) + at(1.0, 0.0) + at(0.0, 1.0) + at(1.0, 1.0))
@@ -81,7 +80,8 @@ fn thin_elements_bend_as_beams_do() {
         let little = stable(&format!("{what}, bent by 1 %"), &mut solver, &model.rest(), &drive(&[], 1.0));
         let ratio = 0.01 * length / sag(&model, &little);
         assert!((0.97..stiffening).contains(&ratio), "{what}: {ratio} times as stiff as a strip");
-        let far = stable(&format!("{what}, bent by 100 times the force"), &mut solver, &little.state, &drive(&[], 100.0));
+        let far =
+            stable(&format!("{what}, bent by 100 times the force"), &mut solver, &little.state, &drive(&[], 100.0));
         assert!(sag(&model, &far) > 0.4 * length, "{what}: {}", sag(&model, &far));
     }
 }

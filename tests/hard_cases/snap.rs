@@ -31,10 +31,8 @@ fn half_arch(rise: f64) -> Mesh {
 fn pressed_arch(rise: f64, pressure: f64, distance: Option<f64>) -> Model {
     let mesh = half_arch(rise);
     let crown = side(&mesh, 0, 1);
-    let mut supports = vec![
-        Support::Clamp { faces: side(&mesh, 0, 0) },
-        Support::Symmetry { faces: crown.clone(), axis: 0 },
-    ];
+    let mut supports =
+        vec![Support::Clamp { faces: side(&mesh, 0, 0) }, Support::Symmetry { faces: crown.clone(), axis: 0 }];
     let mut loads: Vec<Box<dyn Term>> = Vec::new();
     match distance {
         Some(distance) => supports.push(Support::Plate { faces: crown, axis: 2, offset: -distance }),
@@ -46,9 +44,8 @@ fn pressed_arch(rise: f64, pressure: f64, distance: Option<f64>) -> Model {
 /// Force (mN, downwards) that holds the crown.
 fn force_on_crown(model: &Model, found: &Equilibrium) -> f64 {
     let mesh = model.mesh();
-    let at_crown = |parameter: &usize| {
-        mesh.parameter_derivative[*parameter] == 0 && mesh.parameters[*parameter][0] == 20.0
-    };
+    let at_crown =
+        |parameter: &usize| mesh.parameter_derivative[*parameter] == 0 && mesh.parameters[*parameter][0] == 20.0;
     -(0..mesh.parameters.len()).filter(at_crown).map(|k| found.evaluation.force[k][2]).sum::<f64>()
 }
 
@@ -133,7 +130,8 @@ fn a_muscle_snaps_off_its_descending_limb() {
     let pull = nominal_stress(1.5, 0.0);
     let model = muscle_cube(None, pull);
     let mut solver = solver(&model);
-    let start = stable("muscle under a force that stretches it by half", &mut solver, &model.rest(), &drive(&[0.0], 1.0));
+    let start =
+        stable("muscle under a force that stretches it by half", &mut solver, &model.rest(), &drive(&[0.0], 1.0));
     let activation = 0.15;
     let found = stable("then activated by 0.15", &mut solver, &start.state, &drive(&[activation], 1.0));
     assert_eq!(found.snaps.len(), 1);

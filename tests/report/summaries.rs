@@ -22,6 +22,7 @@ fn forward_summary_shows_the_last_frame() {
         frame: FRAME,
         probes: &probes,
         muscles: &muscles,
+        bones: &[],
         tissue_energy: found.evaluation.energies[0],
         external_work: model.external_work(&found.state),
         reactions: &[(12.5, -3.25)],
@@ -60,6 +61,7 @@ fn fit_summary_marks_bounds_and_the_worst_markers() {
     let mut summary = FitSummary {
         name: "smile",
         controls: &MUSCLES,
+        bones: false,
         frames: &frames[..1],
         frames_failed: 0,
         errors: &errors,

@@ -14,7 +14,7 @@ const WORST: usize = 5;
 pub struct FittedFrame {
     /// The frame.
     pub frame: Frame,
-    /// Activations.
+    /// Activations; degrees of hinges, mm of slides.
     pub values: Vec<f64>,
     /// Their standard deviations; `None` for one that was given, not found, or that the markers do not determine.
     pub deviations: Vec<Option<f64>>,
@@ -27,8 +27,10 @@ pub struct FittedFrame {
 pub struct FitSummary<'a> {
     /// Name of the problem.
     pub name: &'a str,
-    /// Names of the controls.
+    /// Names of the controls, those of bones with their unit.
     pub controls: &'a [&'a str],
+    /// Whether some of them are of bones.
+    pub bones: bool,
     /// Frames that converged.
     pub frames: &'a [FittedFrame],
     /// Frames that did not.
@@ -81,7 +83,8 @@ impl FitSummary<'_> {
             [name.to_string(), value, deviation(fitted.deviations[control]), bound.to_owned()]
         };
         let rows: Vec<_> = self.controls.iter().enumerate().map(row).collect();
-        out.write_str(&columns(["muscle", "activation", "sd", ""], &rows))
+        let [kind, value] = if self.bones { ["control", "value"] } else { ["muscle", "activation"] };
+        out.write_str(&columns([kind, value, "sd", ""], &rows))
     }
 
     fn of_clip(&self, frames: &[FittedFrame], out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -103,7 +106,8 @@ impl FitSummary<'_> {
             ]
         };
         let rows: Vec<_> = self.controls.iter().enumerate().map(row).collect();
-        let header = ["muscle", "least", "peak", "sd there", "in frame", "frames at lower", "frames at upper bound"];
+        let kind = if self.bones { "control" } else { "muscle" };
+        let header = [kind, "least", "peak", "sd there", "in frame", "frames at lower", "frames at upper bound"];
         out.write_str(&columns(header, &rows))
     }
 

@@ -1,8 +1,8 @@
 //! The page of a forward run.
 
-use super::{columns, count};
+use super::{columns, count, optional};
 use crate::model::WorstPoint;
-use crate::report::frame::{Frame, MuscleState, ProbeState};
+use crate::report::frame::{BoneState, Frame, MuscleState, ProbeState};
 use std::fmt;
 
 /// What the page shows: all frames in counts, the last one in numbers. `Display` is the page; it ends with a newline.
@@ -20,6 +20,8 @@ pub struct ForwardSummary<'a> {
     pub probes: &'a [ProbeState<'a>],
     /// Its muscles.
     pub muscles: &'a [MuscleState<'a>],
+    /// Its bones.
+    pub bones: &'a [BoneState<'a>],
     /// Energy of the tissue, uJ.
     pub tissue_energy: f64,
     /// Work of dead loads, uJ.
@@ -65,6 +67,13 @@ impl fmt::Display for ForwardSummary<'_> {
         });
         let header = ["muscle", "activation", "stretch", "min", "max", "energy uJ"];
         out.write_str(&columns(header, &muscles.collect::<Vec<_>>()))?;
+        let bones = self.bones.iter().map(|b| {
+            let numbers = [b.hinge_deg, b.torque, b.slide_mm, b.slide_force].map(|number| optional(number, 4));
+            let [hinge, torque, slide, force] = numbers;
+            [b.name.to_owned(), hinge, torque, slide, force]
+        });
+        let header = ["bone", "hinge deg", "torque mN mm", "slide mm", "force mN"];
+        out.write_str(&columns(header, &bones.collect::<Vec<_>>()))?;
         let energies = [("tissue energy", self.tissue_energy), ("work of loads", self.external_work)];
         for (what, energy) in energies {
             writeln!(out, "  {what} {energy:.4} uJ")?;

@@ -1,4 +1,5 @@
-//! `activations.csv`: the controls, a row per frame; behind them their standard deviations where they were fitted.
+//! `activations.csv`: the controls, a row per frame; behind them their standard deviations where they were fitted. A hinge
+//! is in degrees, a slide in mm, an activation has no unit.
 
 use super::{Rows, Table, of_frame};
 use crate::error::Result;

@@ -12,7 +12,7 @@ pub struct FitTable(Table);
 
 impl FitTable {
     /// A new table: `frame,time_s,iteration,cost,step,trust,rejected`: half the sum of the squared weighted residuals after
-    /// the iteration, the largest change of a control, the trust radius in ln(activation + onset), and steps that were
+    /// the iteration, the largest change of a control as a part of its range, the trust radius in ln(activation + onset), and steps that were
     /// tried and rejected.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 //! is an empty cell. The rows of a frame are written at once; where that fails the table ends with the frame before.
 
 mod activations;
+mod bones;
 mod contact;
 mod convergence;
 mod cost;
@@ -14,6 +15,7 @@ mod muscles;
 mod probes;
 
 pub use activations::ActivationTable;
+pub use bones::BoneTable;
 pub use contact::ContactTable;
 pub use convergence::ConvergenceTable;
 pub use cost::write_cost;
@@ -67,7 +69,8 @@ impl<'a> From<&'a str> for Cell<'a> {
 /// Rows of cells as text.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    text: String,
+    /// The rows so far.
+    pub(in crate::report) text: String,
 }
 
 impl Rows {

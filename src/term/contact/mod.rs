@@ -3,23 +3,26 @@
 //! Pi = sum over points w psi(g(x)), with the reference area w of a point and the gap g of its current position:
 //!   dPi/du_ia       = sum w psi' n_i N_a
 //!   d2Pi/du_ia du_kb = sum w (psi'' n_i n_k + psi' d2g/dx_i dx_k) N_a N_b
-//! Where the reference shape already penetrates and that is to be relaxed, g is measured from there and the load factor
+//! A bone may carry the surface. Where the reference shape already penetrates and that is to be relaxed, g is measured from there and the load factor
 //! takes the difference away: g(x) - (1 - load) g(X).
 
+mod carried;
 pub mod law;
 pub mod mutual;
 mod patch;
 pub mod surface;
 
+use super::bone::{Bone, Carried, Wrench};
 use super::constraint::Constraint;
 use super::{Contribution, ElementState, ElementSystem, Term, Want};
 use crate::material::PAIRS;
 use crate::math::quadrature::GaussRule;
-use crate::math::tensor::{Vector, dot, norm};
+use crate::math::tensor::{Vector, add_scaled, dot, norm};
 use crate::mesh::face::Face;
 use crate::mesh::{MaterialPoint, Mesh, position_and_jacobian};
 use law::{Allows, ContactLaw, Response};
 use std::ops::Range;
+use std::sync::Arc;
 use surface::{Gap, RigidSurface};
 
 /// What a body meets, and how.
@@ -38,6 +41,8 @@ pub struct Interface {
 pub struct Contact {
     name: String,
     interface: Interface,
+    /// The bone that carries the surface.
+    bone: Option<Arc<Bone>>,
     points: Vec<Point>,
     /// The points of each element of the host.
     of_element: Vec<Range<usize>>,
@@ -104,7 +109,12 @@ impl Contact {
             }
             of_element[element] = first..points.len();
         }
-        Contact { name: name.to_owned(), interface, points, of_element }
+        Contact { name: name.to_owned(), interface, bone: None, points, of_element }
+    }
+
+    /// The same contact with its surface on a bone.
+    pub fn on(self, bone: Arc<Bone>) -> Contact {
+        Contact { bone: Some(bone), ..self }
     }
 
     /// The point where the reference shape violates the contact most, or comes nearest to it, with its position (mm) and gap
@@ -157,7 +167,12 @@ impl Contact {
     /// Gap and response at a point; `None` where a contact that may open has no surface to meet.
     fn meet(&self, index: usize, state: &ElementState<'_>) -> Option<(Gap, Response)> {
         let point = &self.points[index];
-        let gap = match self.interface.surface.gap(self.position(index, state)) {
+        let (surface, position) = (self.interface.surface.as_ref(), self.position(index, state));
+        let gap = match &self.bone {
+            Some(bone) => carried::gap(surface, &bone.pose(state.controls), position),
+            None => surface.gap(position),
+        };
+        let gap = match gap {
             Some(gap) => Gap { value: gap.value - (1.0 - state.load) * point.relaxed, ..gap },
             None if self.interface.allows == Allows::ClosedOrOpen => return None,
             // the body has slid off the surface it must stay on: no admissible state
@@ -243,7 +258,27 @@ impl Term for Contact {
         }
     }
 
+    fn controls(&self) -> &[usize] {
+        self.bone.as_ref().map_or(&[], |bone| bone.controls())
+    }
+
+    /// w (psi'' dg/dq n_i + psi' dn_i/dq) N_a where a bone carries the surface.
+    fn add_control_force(&self, control: usize, state: &ElementState<'_>, force: &mut [[f64; 64]; 3]) {
+        let Some(twist) = self.bone.as_ref().and_then(|bone| bone.twist(control, state.controls)) else { return };
+        for index in self.of_element[state.element].clone() {
+            let Some((gap, response)) = self.meet(index, state) else { continue };
+            let (point, position) = (&self.points[index], self.position(index, state));
+            let along = point.weight * response.stiffness * carried::gap_rate(&gap, &twist, position);
+            let turned = carried::normal_rate(&gap, &twist, position).map(|n| point.weight * response.slope * n);
+            point.add_force(add_scaled(turned, along, gap.normal), force);
+        }
+    }
+
     fn as_contact(&self) -> Option<&Contact> {
+        Some(self)
+    }
+
+    fn as_carried(&self) -> Option<&dyn Carried> {
         Some(self)
     }
 
@@ -294,5 +329,32 @@ impl Constraint for Contact {
                 _ => 0.0,
             };
         }
+    }
+
+    fn add_control_rate(&self, control: usize, state: &ElementState<'_>, z: &mut [f64]) {
+        let Some(twist) = self.bone.as_ref().and_then(|bone| bone.twist(control, state.controls)) else { return };
+        for index in self.of_element[state.element].clone() {
+            let Some((gap, response)) = self.meet(index, state) else { continue };
+            if response.stiffness > 0.0 {
+                let rate = carried::gap_rate(&gap, &twist, self.position(index, state));
+                z[index] += self.points[index].weight.sqrt() * rate;
+            }
+        }
+    }
+}
+
+impl Carried for Contact {
+    fn bone(&self) -> Option<&Arc<Bone>> {
+        self.bone.as_ref()
+    }
+
+    fn wrench(&self, state: &ElementState<'_>) -> Wrench {
+        let mut wrench = Wrench::default();
+        for index in self.of_element[state.element].clone() {
+            let Some((gap, response)) = self.meet(index, state) else { continue };
+            let push = -self.points[index].weight * response.slope;
+            wrench.add_force(gap.normal.map(|n| push * n), self.position(index, state));
+        }
+        wrench
     }
 }

@@ -1,0 +1,39 @@
+//! The recording that a fit names, and which of its frames it asks for.
+
+use crate::error::{Error, Result};
+use crate::markers::{self, ReadOptions, Recording};
+use crate::scene::{FitSpec, FramesSpec};
+
+/// How a fit wants its recording read.
+pub fn options(fit: &FitSpec) -> ReadOptions {
+    ReadOptions {
+        topic: fit.topic.clone(),
+        units: fit.units,
+        zero_is_missing: fit.zero_is_missing,
+        allow_truncated: fit.allow_truncated,
+        allow_unchecked: fit.allow_unchecked,
+    }
+}
+
+/// Reads the recording that a fit names.
+///
+/// # Errors
+/// Whatever is wrong with the file, with the place that names it.
+pub fn read(fit: &FitSpec) -> Result<Recording> {
+    markers::read(&fit.markers, &options(fit))
+        .map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
+}
+
+/// The frames of a recording that a fit asks for.
+///
+/// # Errors
+/// Where the recording does not have the first or the last of them.
+pub fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>> {
+    let count = recording.frames.len();
+    let FramesSpec { first, last, step } = fit.frames;
+    let last = last.unwrap_or(count.saturating_sub(1));
+    if let Some(frame) = [first, last].into_iter().find(|frame| *frame >= count) {
+        return Err(Error::NoSuchFrame { frame, count, place: Box::new(fit.frames_place.clone()) });
+    }
+    Ok((first..=last).step_by(step).collect())
+}

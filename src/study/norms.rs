@@ -1,0 +1,158 @@
+//! How far a solution is from a reference, in several norms.
+//!
+//! Fields are compared at the quadrature points X of the reference's host, w their volumes and V its own:
+//!   displacement  sqrt(1/V sum w |u - u_ref|^2),   gradient  sqrt(1/V sum w |du/dX - du_ref/dX|^2),
+//!   det F         sqrt(1/V sum w (J - J_ref)^2)
+//! of the last frame. Probes, markers and activations are compared in all frames.
+
+use super::solution::{Prepared, Solution};
+use crate::error::Result;
+use crate::math::quadrature::GaussRule;
+use crate::math::tensor::{Matrix, Vector, determinant, inverse, norm, subtract};
+use crate::mesh::location::Locator;
+use crate::mesh::{MaterialPoint, Mesh, position_and_jacobian};
+use crate::model::State;
+use crate::scene::{Curves, Measure};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Points per direction and element of the reference.
+const GAUSS: usize = 3;
+
+/// Errors by measure, in the order of [`Measure::ALL`]; `None` where a measure does not apply.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Errors([Option<f64>; Measure::ALL.len()]);
+
+impl Errors {
+    /// The error in one measure.
+    pub fn get(&self, measure: Measure) -> Option<f64> {
+        self.0[measure as usize]
+    }
+
+    fn set(&mut self, measure: Measure, value: f64) {
+        self.0[measure as usize] = value.is_finite().then_some(value);
+    }
+}
+
+/// Against another solution of the same frames.
+pub fn against_solution(own: (&Prepared, &Solution), reference: (&Prepared, &Solution)) -> Errors {
+    let mut errors = Errors::default();
+    let ((problem, found), (best, known)) = (own, reference);
+    let pairs = || found.frames.iter().zip(&known.frames).map(|(a, b)| (&a.state, &b.state));
+    let (mesh, best_mesh) = (problem.built.model.mesh(), best.built.model.mesh());
+    let displaced = |mesh: &Mesh, at: MaterialPoint, state: &State| mesh.interpolate(at, &state.u);
+    let distance = |a: MaterialPoint, b: MaterialPoint, (own, known): (&State, &State)| {
+        norm(subtract(displaced(mesh, a, own), displaced(best_mesh, b, known)))
+    };
+    let probes = problem.built.probes.iter().zip(&best.built.probes);
+    if problem.built.probes.len() == best.built.probes.len() && !problem.built.probes.is_empty() {
+        let of_probe = |(a, b): (&MaterialPoint, &MaterialPoint)| {
+            pairs().map(|states| distance(*a, *b, states)).fold(0.0, f64::max)
+        };
+        errors.set(Measure::Probes, probes.map(of_probe).fold(0.0, f64::max));
+    }
+    if !found.markers.is_empty() && found.markers.len() == known.markers.len() {
+        let squares =
+            found.markers.iter().zip(&known.markers).flat_map(|(a, b)| pairs().map(|s| distance(*a, *b, s).powi(2)));
+        errors.set(Measure::Markers, root_mean(squares));
+        errors.set(
+            Measure::Activations,
+            root_mean(pairs().flat_map(|(a, b)| squares_between(&a.controls, &b.controls))),
+        );
+    }
+    if let (Some(own), Some(known)) = (found.frames.last(), known.frames.last()) {
+        if let Some([displacement, gradient, det_f]) = fields(mesh, &own.state, best_mesh, &known.state) {
+            errors.set(Measure::Displacement, displacement);
+            errors.set(Measure::Gradient, gradient);
+            errors.set(Measure::DetF, det_f);
+        }
+        let stored = |prepared: &Prepared, energies: &[f64]| -> f64 {
+            prepared.built.model.terms().iter().zip(energies).filter(|(t, _)| !t.is_load()).map(|(_, e)| e).sum()
+        };
+        let known_energy = stored(best, &known.evaluation.energies);
+        errors.set(Measure::Energy, (stored(problem, &own.evaluation.energies) / known_energy - 1.0).abs());
+    }
+    errors
+}
+
+/// Against known displacements of probes in the last frame, each `<probe>.ux_mm` and so on.
+pub fn against_values(problem: &Prepared, found: &Solution, values: &[(String, f64)]) -> Errors {
+    let mut errors = Errors::default();
+    let Some(last) = found.frames.last() else { return errors };
+    let mesh = problem.built.model.mesh();
+    let difference = |(key, value): &(String, f64)| -> Option<f64> {
+        let (probe, component) = key.rsplit_once('.')?;
+        let index = problem.scene.probes.iter().position(|p| p.name == probe)?;
+        let component = ["ux_mm", "uy_mm", "uz_mm"].iter().position(|c| *c == component)?;
+        Some((mesh.interpolate(problem.built.probes[index], &last.state.u)[component] - value).abs())
+    };
+    let worst = values
+        .iter()
+        .map(|v| difference(v).unwrap_or(f64::NAN))
+        .fold(0.0, |a: f64, b| if b.is_nan() { b } else { a.max(b) });
+    errors.set(Measure::Probes, worst);
+    errors
+}
+
+/// Against known activations over time, a table `time_s,<control>,...`.
+///
+/// # Errors
+/// A table that cannot be read.
+pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -> Result<Errors> {
+    let names: Vec<&str> = problem.built.model.controls().iter().map(|c| c.name.as_str()).collect();
+    let truth = Curves::read(table, &problem.scene.control_ranges())?;
+    let squares = found.frames.iter().zip(&found.times_s).flat_map(|(frame, time_s)| {
+        let known = names.iter().zip(&frame.state.controls);
+        known.filter_map(|(name, value)| Some((truth.at(name, *time_s)? - value).powi(2))).collect::<Vec<f64>>()
+    });
+    let mut errors = Errors::default();
+    errors.set(Measure::Activations, root_mean(squares));
+    Ok(errors)
+}
+
+fn squares_between<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b))
+}
+
+fn root_mean(squares: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = squares.fold((0.0, 0), |(sum, count), s| (sum + s, count + 1));
+    (sum / f64::from(count)).sqrt()
+}
+
+/// Displacement, du/dX and det F at a material point.
+fn field(mesh: &Mesh, state: &State, at: MaterialPoint, local: &[[f64; 64]; 3]) -> (Vector, Matrix, f64) {
+    let u = mesh.local_of(at.element, &state.u);
+    let (value, by_xi) = position_and_jacobian(mesh.element, &u, at.xi);
+    let (_, jacobian) = position_and_jacobian(mesh.element, local, at.xi);
+    let to_xi = inverse(&jacobian, determinant(&jacobian));
+    let gradient: Matrix =
+        std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|d| by_xi[i][d] * to_xi[d][j]).sum()));
+    let f = std::array::from_fn(|i| std::array::from_fn(|j| gradient[i][j] + f64::from(u8::from(i == j))));
+    (value, gradient, determinant(&f))
+}
+
+/// Root mean square differences of displacement, gradient and det F; `None` where the bodies do not cover each other.
+fn fields(mesh: &Mesh, own: &State, best: &Mesh, known: &State) -> Option<[f64; 3]> {
+    let locator = Locator::new(mesh);
+    let rule = GaussRule::new(GAUSS);
+    let of_element = |element: usize| -> Option<[f64; 4]> {
+        let local = best.local(element);
+        let mut sums = [0.0; 4];
+        for (xi, weight) in rule.cube() {
+            let (x, jacobian) = position_and_jacobian(best.element, &local, xi);
+            let volume = weight * determinant(&jacobian);
+            let at = locator.locate(x).ok()?;
+            let (u, gradient, det) = field(mesh, own, at, &mesh.local(at.element));
+            let (u_ref, gradient_ref, det_ref) = field(best, known, MaterialPoint { element, xi }, &local);
+            let square = |a: &[f64], b: &[f64]| squares_between(a, b).sum::<f64>();
+            sums[0] += volume;
+            sums[1] += volume * square(&u, &u_ref);
+            sums[2] += volume * square(gradient.as_flattened(), gradient_ref.as_flattened());
+            sums[3] += volume * (det - det_ref) * (det - det_ref);
+        }
+        Some(sums)
+    };
+    let all: Vec<[f64; 4]> = (0..best.elements()).into_par_iter().map(of_element).collect::<Option<_>>()?;
+    let sums = all.iter().fold([0.0; 4], |a, b| std::array::from_fn(|k| a[k] + b[k]));
+    Some([1, 2, 3].map(|k| (sums[k] / sums[0]).sqrt()))
+}
