@@ -154,6 +154,24 @@ impl<'m> Balance<'m> {
         self.factored.then(|| self.factor.inertia().negative.saturating_sub(pressures))
     }
 
+    /// d(unknowns)/d(control) at the equilibrium `state`, one control after the other: K_ff du_f = - dr/dq - K_fp du_p/dq,
+    /// with the motion u_p of faces on bones.
+    pub fn rates(&mut self, state: &State, controls: &[usize]) -> Result<Vec<f64>> {
+        let model = self.model;
+        let mut rhs = Vec::with_capacity(controls.len() * model.numbering().unknowns());
+        for control in controls {
+            let mut force = model.control_force(state, *control);
+            if let Some(moved) = model.supports().rate(model.mesh(), *control, &state.controls) {
+                let lifted = self.evaluate(state, Want::Stiffness, Some(&moved)).lifted;
+                force.iter_mut().zip(lifted).for_each(|(f, k)| *f += k);
+            }
+            rhs.extend(force.iter().map(|f| -f));
+        }
+        let moved = controls.iter().map(|control| model.constraint_control_rate(state, *control)).collect();
+        self.solve_held(state, &mut rhs, moved)?;
+        Ok(rhs)
+    }
+
     /// Factorises the tangent at a state, to see its negative modes.
     pub fn inspect(&mut self, state: &State) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);
@@ -177,24 +195,6 @@ impl<'m> Balance<'m> {
     /// K x = b with the tangent that is factorised.
     pub fn solve_factored(&mut self, rhs: &mut [f64]) -> Result<()> {
         self.factor.solve(&self.tangent.matrix, rhs, 1, STEP_TOLERANCE).map(|_| ())
-    }
-
-    /// d(unknowns)/d(control) at the equilibrium `state`, one control after the other: K_ff du_f = - dr/dq - K_fp du_p/dq,
-    /// with the motion u_p of faces on bones.
-    pub fn rates(&mut self, state: &State, controls: &[usize]) -> Result<Vec<f64>> {
-        let model = self.model;
-        let mut rhs = Vec::with_capacity(controls.len() * model.numbering().unknowns());
-        for control in controls {
-            let mut force = model.control_force(state, *control);
-            if let Some(moved) = model.supports().rate(model.mesh(), *control, &state.controls) {
-                let lifted = self.evaluate(state, Want::Stiffness, Some(&moved)).lifted;
-                force.iter_mut().zip(lifted).for_each(|(f, k)| *f += k);
-            }
-            rhs.extend(force.iter().map(|f| -f));
-        }
-        let moved = controls.iter().map(|control| model.constraint_control_rate(state, *control)).collect();
-        self.solve_held(state, &mut rhs, moved)?;
-        Ok(rhs)
     }
 
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {

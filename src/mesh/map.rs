@@ -1,7 +1,8 @@
 //! Element parameter maps: each local parameter of an element is a sum of scale x global parameter.
 //!
 //! One idea covers shared nodes of unequal elements (scale factors), reversed or permuted directions, versions,
-//! collapsed nodes and hanging nodes. The three components of a field share one map.
+//! collapsed nodes and hanging nodes. The three components of a field share one map;
+//! a field whose components do not is brought into one by [`continuous`](super::continuous::continuous).
 
 /// local parameter (element, a) = sum over its terms of scale x global parameter.
 #[derive(Debug, Clone)]

@@ -2,6 +2,7 @@
 
 pub mod bezier;
 pub mod block;
+pub mod continuous;
 pub mod element;
 pub mod exf;
 pub mod face;

@@ -53,7 +53,7 @@ const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
 /// host, supports that contradict each other, points of loads outside,
 /// regions that are none.
 pub fn build(scene: &Scene) -> Result<Built> {
-    let mesh = host(&scene.mesh)?;
+    let (mesh, warning) = host_with_warning(&scene.mesh)?;
     let space: &'static dyn PressureSpace = match scene.tissue.pressure {
         PressureSpec::Trilinear => &pressure::Trilinear,
         PressureSpec::DiscontinuousTrilinear => &pressure::DiscontinuousTrilinear,
@@ -63,13 +63,14 @@ pub fn build(scene: &Scene) -> Result<Built> {
     let Host { term: tissue, volume, shear_modulus } = tissue(scene, &mesh, space)?;
 
     let mut mistakes = Vec::new();
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<Warning> = warning.into_iter().collect();
     let mut terms: Vec<Box<dyn Term>> = vec![tissue];
     let mut controls = Vec::new();
     let locator = Locator::new(&mesh);
     for spec in &scene.muscles {
         let names = match embed(scene, spec, &locator, controls.len()) {
-            Ok((muscle, names)) => {
+            Ok((muscle, names, warning)) => {
+                warnings.extend(warning);
                 let host_element = volume / mesh.elements() as f64;
                 warnings.extend(coarse_rule(spec, &scene.mesh.geometry, &muscle, host_element));
                 terms.push(Box::new(muscle));
@@ -138,7 +139,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     let element_size = (volume / mesh.elements() as f64).cbrt();
-    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus));
+    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus, scene.solver.tolerance));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {
@@ -171,13 +172,20 @@ pub fn build(scene: &Scene) -> Result<Built> {
 /// # Errors
 /// An EX file that cannot be read, or that holds no tricubic Hermite mesh.
 pub fn host(spec: &MeshSpec) -> Result<Mesh> {
+    host_with_warning(spec).map(|(mesh, _)| mesh)
+}
+
+/// The same, and the warning where the file holds something that the mesh can only come close to.
+fn host_with_warning(spec: &MeshSpec) -> Result<(Mesh, Option<Warning>)> {
     match &spec.geometry {
-        GeometrySpec::Block(spec) => Ok(block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements)),
-        GeometrySpec::Blocks(all) => Ok(blocks(&TricubicHermite, all)),
+        GeometrySpec::Block(spec) => Ok((block(&TricubicHermite, spec.origin_mm, spec.size_mm, spec.elements), None)),
+        GeometrySpec::Blocks(all) => Ok((blocks(&TricubicHermite, all), None)),
         GeometrySpec::Exf(exf) => {
-            let Geometry { mesh, field, .. } = ExFile::read(&exf.path)?.geometry(exf.field.as_deref())?;
+            let geometry = ExFile::read(&exf.path)?.geometry(exf.field.as_deref())?;
+            let warning = geometry.warning(&spec.place);
+            let Geometry { mesh, field, .. } = geometry;
             if mesh.element.parameters_per_node() == 8 {
-                return Ok(mesh);
+                return Ok((mesh, warning));
             }
             Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
         }
@@ -223,8 +231,8 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
     Ok(all)
 }
 
-/// The mesh of a muscle and the angles of its fibres.
-fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles)> {
+/// The mesh of a muscle, the angles of its fibres, and the warning of its mesh.
+fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
     let (mesh, file) = match &spec.geometry {
         GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
         GeometrySpec::Blocks(all) => (blocks(&Trilinear, all), None),
@@ -247,13 +255,19 @@ fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles)> {
             }
         },
     };
-    Ok((mesh, angles))
+    let warning = file.and_then(|(_, geometry)| geometry.warning(&spec.place));
+    Ok((mesh, angles, warning))
 }
 
-/// Embeds a muscle whose first control is `first`; gives the names of its controls too.
-fn embed(scene: &Scene, spec: &MuscleSpec, locator: &Locator<'_>, first: usize) -> Result<(Muscle, Vec<String>)> {
+/// Embeds a muscle whose first control is `first`; gives the names of its controls and the warning of its mesh too.
+fn embed(
+    scene: &Scene,
+    spec: &MuscleSpec,
+    locator: &Locator<'_>,
+    first: usize,
+) -> Result<(Muscle, Vec<String>, Option<Warning>)> {
     let ElementSpec::Trilinear = spec.element;
-    let (mesh, angles) = muscle_mesh(spec)?;
+    let (mesh, angles, warning) = muscle_mesh(spec)?;
     let (activation, names) = match spec.activation {
         ActivationSpec::Uniform => (Activation::Uniform(first), vec![spec.name.clone()]),
         ActivationSpec::Field => {
@@ -282,7 +296,7 @@ fn embed(scene: &Scene, spec: &MuscleSpec, locator: &Locator<'_>, first: usize) 
         p2: b.p2,
     };
     let muscle = Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, activation);
-    muscle.map(|muscle| (muscle, names)).map_err(|error| match error {
+    muscle.map(|muscle| (muscle, names, warning)).map_err(|error| match error {
         NotEmbedded::Outside { count, of, element, position, distance } => {
             Error::MuscleOutside(Box::new(MuscleOutside {
                 muscle: spec.name.clone(),

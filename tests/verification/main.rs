@@ -14,5 +14,6 @@ mod patch_test;
 mod prescribed_state;
 mod rivlin_torsion;
 mod solved_cases;
+mod sphere_inflation;
 mod support;
 mod uniaxial_and_shear;

@@ -1,7 +1,8 @@
 //! Fibre angles of an EX file: a field of the coordinate system `fibre`, in radians, trilinear in every element.
 
 use super::file::ExFile;
-use super::geometry::{Geometry, missing, unsupported};
+use super::geometry::Geometry;
+use super::sums::{missing, unsupported};
 use crate::error::{Error, Place, Result};
 use crate::mesh::fibre_angles::FibreAngles;
 use std::collections::BTreeMap;
@@ -52,7 +53,7 @@ impl ExFile {
                         &component.place,
                     ));
                 }
-                let sums = self.sums(region, element, field, index, true)?;
+                let sums = self.sums(region, element, field, index)?;
                 for (corner, sum) in angles.iter_mut().zip(sums) {
                     for (key, scale) in sum {
                         corner[index] += scale * self.value(region, field, index, key)?;

@@ -79,11 +79,21 @@ impl Basis {
         self.0.iter().map(|basis| basis.functions()).product()
     }
 
+    /// The number of its nodes along each direction.
+    pub fn nodes(self) -> [usize; 3] {
+        self.0.map(|basis| basis.functions() / basis.per_node())
+    }
+
+    /// The function that is the value at a node (nodes with xi1 fastest).
+    pub fn value_at(self, node: usize) -> usize {
+        node * self.0.iter().map(|basis| basis.per_node()).product::<usize>()
+    }
+
     /// For function `f` in the order of EX files (nodes with xi1 fastest, within a node derivatives with xi1 fastest), the
     /// index of its 1-D factor in each direction.
     fn factors(self, f: usize) -> [usize; 3] {
         let per_node = self.0.map(Basis1d::per_node);
-        let nodes: [usize; 3] = std::array::from_fn(|d| self.0[d].functions() / per_node[d]);
+        let nodes = self.nodes();
         let at_node: usize = per_node.iter().product();
         let (mut node, mut derivative) = (f / at_node, f % at_node);
         std::array::from_fn(|d| {

@@ -4,6 +4,7 @@ use super::basis::Basis;
 use super::label;
 use super::lines::{Lines, number_after, starts_something};
 use super::nodes::FieldLine;
+use super::theta::Unwind;
 use crate::error::{Place, Result};
 
 /// Which parameter of a node is meant.
@@ -32,6 +33,8 @@ pub(super) struct Component {
     pub place: Place,
     /// The basis, or the words that are not understood here.
     pub basis: std::result::Result<Basis, String>,
+    /// How it runs along xi1 if it is an angle that goes around.
+    pub unwind: Option<Unwind>,
     /// The terms of the parameter of each function; none means that it is zero.
     pub functions: Vec<Vec<Term>>,
 }
@@ -156,6 +159,7 @@ impl Component {
                 name,
                 place,
                 basis: Err("a field that is constant".into()),
+                unwind: None,
                 functions: Vec::new(),
             });
         }
@@ -164,16 +168,17 @@ impl Component {
             return Err(lines.wrong(EXPECTED));
         };
         let (map, options) = map.split_once('.').ok_or_else(|| lines.wrong(EXPECTED))?;
-        let parsed = match (modify, map) {
-            ("no modify", "standard node based" | "node based") => {
+        let unwind = Unwind::parse(modify);
+        let parsed = match (modify == "no modify" || unwind.is_some(), map) {
+            (true, "standard node based" | "node based") => {
                 Basis::parse(basis).ok_or_else(|| format!("the basis `{basis}`"))
             }
-            ("no modify", _) => Err(format!("a field that is `{map}`")),
-            _ => Err(format!("a basis with `{modify}`")),
+            (true, _) => Err(format!("a field that is `{map}`")),
+            (false, _) => Err(format!("a basis with `{modify}`")),
         };
         if !map.ends_with("node based") {
             lines.skip_until(|line| !line.starts_with('#'));
-            return Ok(Component { name, place, basis: parsed, functions: Vec::new() });
+            return Ok(Component { name, place, basis: parsed, unwind, functions: Vec::new() });
         }
         let set = if version < 2 {
             Some(basis)
@@ -207,7 +212,7 @@ impl Component {
                 basis.functions()
             )));
         }
-        Ok(Component { name, place, basis: parsed, functions })
+        Ok(Component { name, place, basis: parsed, unwind, functions })
     }
 }
 

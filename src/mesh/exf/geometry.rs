@@ -1,12 +1,12 @@
-//! From an EX file to a mesh: every element parameter as a sum of scale x global parameter.
+//! From an EX file to a mesh.
 
-use super::LABELS;
-use super::elements::{Component, Element, Source};
+use super::convert::{Conversion, convert};
 use super::file::{ExFile, Region};
-use super::nodes::{FieldLine, NodeField};
+use super::sums::{FieldInElement, Key, Sum, unsupported};
+use super::system::System;
 use crate::error::{Error, Place, Result};
 use crate::mesh::Mesh;
-use crate::mesh::element::{TricubicHermite, Trilinear};
+use crate::mesh::element::{Element, TricubicHermite, Trilinear};
 use crate::mesh::face::{Face, boundary_faces};
 use crate::mesh::map::{ElementMap, Term};
 use std::collections::BTreeMap;
@@ -14,73 +14,125 @@ use std::collections::BTreeMap;
 /// A mesh read from an EX file, with the identifiers that the file uses.
 #[derive(Debug, Clone)]
 pub struct Geometry {
-    /// The mesh. Where every element is trilinear, so is the mesh; otherwise it is tricubic Hermite. Its boundary faces
-    /// are named `boundary` (all of them), `xi1=0` to `xi3=1` (all that are that side of their element) and, one by one,
-    /// by element and side, for example `7:xi1=0`.
+    /// The mesh. Where every element is trilinear in x, y and z, so is the mesh; otherwise it is tricubic Hermite. Its
+    /// boundary faces are named `boundary` (all of them), `xi1=0` to `xi3=1` (all that are that side of their element) and,
+    /// one by one, by element and side, for example `7:xi1=0`.
     pub mesh: Mesh,
     /// The identifier of each element.
     pub elements: Vec<i64>,
-    /// The identifier of each node. A node whose value has several versions is several nodes of the mesh.
+    /// The identifier of each node. A node whose position has several versions is several nodes of the mesh.
     pub nodes: Vec<i64>,
     /// The name of the field of coordinates.
     pub field: String,
+    /// What the mesh lacks of the field in the file; `None` where they are the same.
+    pub conversion: Option<Conversion>,
     /// Index of its region in the file.
     pub(super) region: usize,
 }
 
-/// A nodal parameter: node, version, bit mask of the derivative.
-type Key = (i64, u32, u8);
+/// What the elements of a field have in common.
+struct Elements<'f> {
+    all: Vec<FieldInElement<'f>>,
+    /// Whether its coordinates are rectangular cartesian.
+    cartesian: bool,
+    basis: &'static dyn Element,
+    /// The parameters of all elements in turn, if the three components have the same.
+    locals: Option<Vec<Sum>>,
+    /// The identifier of the node at each corner.
+    corners: Vec<[i64; 8]>,
+}
 
-/// An element parameter: nodal parameters and their scales.
-type Sum = Vec<(Key, f64)>;
-
-/// A field in one element.
-pub(super) struct FieldInElement<'f> {
-    pub element: &'f Element,
-    pub line: &'f FieldLine,
-    pub components: &'f [Component],
+/// A mesh whose elements use nodal parameters as the file says.
+pub(super) struct NodalMesh {
+    pub mesh: Mesh,
+    /// The identifier of each node.
+    pub nodes: Vec<i64>,
+    /// Which nodal parameter each global parameter is.
+    pub keys: Vec<Key>,
 }
 
 impl ExFile {
     /// The mesh of the field `field`; without a name, of `coordinates`, or of the only field of coordinates.
+    ///
+    /// Where the three components share one map in x, y and z, the mesh has that map. Where they do not, its elements share
+    /// what keeps them [`continuous`](crate::mesh::continuous::continuous), which is still the same shape. Curvilinear
+    /// coordinates are no polynomials in x, y and z: the mesh takes over their values and derivatives at the
+    /// corners of every element, and `conversion` says what is left between; [`ExFile::coordinates`] is the field itself.
     ///
     /// # Errors
     /// [`Error::ExField`] where there is no such field or no telling which, [`Error::ExUnsupported`] for what cannot be
     /// represented, [`Error::ExMissing`] for nodes and parameters that elements use and that are not there.
     pub fn geometry(&self, field: Option<&str>) -> Result<Geometry> {
         let (region, field) = self.choose(field)?;
-        let elements = self.field_in_elements(&self.regions[region], &field);
-        let nodes = &self.regions[region];
-        let trilinear = elements.iter().all(|element| {
-            element.components.iter().all(|component| matches!(&component.basis, Ok(basis) if basis.is_trilinear()))
-        });
-        let basis: &'static dyn crate::mesh::element::Element = if trilinear { &Trilinear } else { &TricubicHermite };
+        let elements = self.elements(&self.regions[region], &field)?;
+        let identifiers: Vec<i64> = elements.all.iter().map(|element| element.element.identifier).collect();
+        let nodal = match &elements.locals {
+            Some(locals) => Some(self.nodal_mesh(&self.regions[region], &field, elements.basis, locals)?),
+            None => None,
+        };
+        let (mut mesh, nodes, conversion) = match nodal {
+            Some(nodal) if elements.cartesian => (nodal.mesh, nodal.nodes, None),
+            nodal => convert(&self.coordinates(Some(&field))?, nodal, elements.basis, &elements.corners),
+        };
+        mesh.named_faces = named_faces(&mesh, &identifiers);
+        Ok(Geometry { mesh, elements: identifiers, nodes, field, conversion, region })
+    }
 
-        let mut locals: Vec<Sum> = Vec::with_capacity(elements.len() * basis.functions());
-        let mut corner_keys: Vec<[(i64, u32); 8]> = Vec::with_capacity(elements.len());
-        for element in &elements {
-            let sums = self.parameters(nodes, element, &field, trilinear)?;
-            let mut corners = [(0, 0); 8];
-            for (corner, key) in corners.iter_mut().enumerate() {
-                *key = match sums[corner * basis.parameters_per_node()][..] {
-                    [((node, version, 0), 1.0)] => (node, version),
-                    _ => {
-                        return Err(unsupported(
-                            format!(
-                                "corner {} of element {}, whose position is not the value of a node",
-                                corner + 1,
-                                element.element.identifier
-                            ),
-                            "give every corner of every element a node of its own; a corner that hangs on an edge is not read",
-                            &element.element.place,
-                        ));
-                    }
-                };
-            }
-            corner_keys.push(corners);
-            locals.extend(sums);
+    /// The elements that define a field, checked for what can be read.
+    fn elements<'f>(&'f self, region: &'f Region, field: &str) -> Result<Elements<'f>> {
+        let all = self.field_in_elements(region, field);
+        let mut cartesian = true;
+        for element in &all {
+            cartesian &= self.system(element, field)? == System::RectangularCartesian;
         }
+        let components = || all.iter().flat_map(|element| element.components);
+        let trilinear =
+            cartesian && components().all(|component| matches!(&component.basis, Ok(basis) if basis.is_trilinear()));
+        let basis: &'static dyn Element = if trilinear { &Trilinear } else { &TricubicHermite };
+        let mut one_map = components().all(|component| component.unwind.is_none());
+        let (mut locals, mut corners) = (Vec::new(), Vec::with_capacity(all.len()));
+        for element in &all {
+            let sums = |index| match trilinear {
+                true => self.sums(region, element, field, index),
+                false => self.hermite_sums(region, element, field, index),
+            };
+            let [x, y, z] = [sums(0)?, sums(1)?, sums(2)?];
+            let nodes = corner_nodes(&x, basis);
+            for others in [corner_nodes(&y, basis), corner_nodes(&z, basis)] {
+                if let Some(corner) = (0..8).find(|k| nodes[*k].is_none() || others[*k] != nodes[*k]) {
+                    return Err(unsupported(
+                        format!(
+                            "corner {} of element {}, whose position is not the value of a node",
+                            corner + 1,
+                            element.element.identifier
+                        ),
+                        "give every corner of every element a node of its own; a corner that hangs on an edge is not read",
+                        &element.element.place,
+                    ));
+                }
+            }
+            corners.push(nodes.map(Option::unwrap_or_default));
+            one_map &= x == y && x == z;
+            if one_map {
+                locals.extend(x);
+            }
+        }
+        Ok(Elements { all, cartesian, basis, locals: one_map.then_some(locals), corners })
+    }
 
+    /// The mesh with the parameters `locals` of its elements, which are nodal parameters of all three components alike.
+    fn nodal_mesh(
+        &self,
+        region: &Region,
+        field: &str,
+        basis: &'static dyn Element,
+        locals: &[Sum],
+    ) -> Result<NodalMesh> {
+        let corners = locals.chunks_exact(basis.functions()).map(|sums| {
+            let value = |corner: usize| sums[corner * basis.parameters_per_node()][0].0;
+            std::array::from_fn(|corner| (value(corner).0, value(corner).1))
+        });
+        let corner_keys: Vec<[(i64, u32); 8]> = corners.collect();
         let mut node_index: BTreeMap<(i64, u32), usize> = corner_keys.iter().flatten().map(|key| (*key, 0)).collect();
         node_index.values_mut().enumerate().for_each(|(index, node)| *node = index);
         // a parameter belongs to the corner of its node and version, or else to the first corner that uses it
@@ -93,8 +145,8 @@ impl ExFile {
                 globals.entry((*node, *version, *label)).or_insert(*own.unwrap_or(&node_index[&corner]));
             }
         }
-        let index_of: BTreeMap<Key, u32> =
-            globals.keys().enumerate().map(|(index, key)| (*key, index as u32)).collect();
+        let keys: Vec<Key> = globals.keys().copied().collect();
+        let index_of: BTreeMap<Key, u32> = keys.iter().enumerate().map(|(index, key)| (*key, index as u32)).collect();
         let terms = locals
             .iter()
             .map(|sum| sum.iter().map(|(key, scale)| Term { global: index_of[key], scale: *scale }).collect());
@@ -104,25 +156,22 @@ impl ExFile {
             corners: corner_keys.iter().map(|corners| corners.map(|key| node_index[&key])).collect(),
             nodes: node_index.len(),
             parameter_node: globals.values().copied().collect(),
-            parameter_derivative: globals.keys().map(|(_, _, label)| *label).collect(),
-            parameters: Vec::with_capacity(globals.len()),
+            parameter_derivative: keys.iter().map(|(_, _, label)| *label).collect(),
+            parameters: Vec::with_capacity(keys.len()),
             named_faces: BTreeMap::new(),
         };
-        for key in globals.keys() {
+        for key in &keys {
             let mut parameter = [0.0; 3];
             for (component, value) in parameter.iter_mut().enumerate() {
-                *value = self.value(nodes, &field, component, *key)?;
+                *value = self.value(region, field, component, *key)?;
             }
             mesh.parameters.push(parameter);
         }
-        let identifiers: Vec<i64> = elements.iter().map(|element| element.element.identifier).collect();
-        mesh.named_faces = named_faces(&mesh, &identifiers);
-        let nodes = node_index.keys().map(|(node, _)| *node).collect();
-        Ok(Geometry { mesh, elements: identifiers, nodes, field, region })
+        Ok(NodalMesh { mesh, nodes: node_index.keys().map(|(node, _)| *node).collect(), keys })
     }
 
     /// The field of coordinates to read, and its region.
-    fn choose(&self, field: Option<&str>) -> Result<(usize, String)> {
+    pub(super) fn choose(&self, field: Option<&str>) -> Result<(usize, String)> {
         let mut found: BTreeMap<&str, usize> = BTreeMap::new();
         let mut regions = Vec::new();
         for (index, region) in self.regions.iter().enumerate() {
@@ -160,147 +209,14 @@ impl ExFile {
         };
         name.map(|name| (found[name], name.to_string())).ok_or_else(|| error(field))
     }
-
-    /// The elements that define a field, in the order of the file; a later definition replaces an earlier one.
-    pub(super) fn field_in_elements<'f>(&'f self, region: &'f Region, field: &str) -> Vec<FieldInElement<'f>> {
-        let mut position: BTreeMap<i64, usize> = BTreeMap::new();
-        let mut all: Vec<FieldInElement> = Vec::new();
-        for element in &region.elements {
-            let fields = &self.templates[element.template].fields;
-            let Some((line, components)) = fields.iter().find(|(line, _)| line.name == field) else { continue };
-            let place = *position.entry(element.identifier).or_insert(all.len());
-            let this = FieldInElement { element, line, components };
-            match all.get_mut(place) {
-                Some(earlier) => *earlier = this,
-                None => all.push(this),
-            }
-        }
-        all
-    }
-
-    /// The parameters of an element, one map for its three components.
-    fn parameters(
-        &self,
-        region: &Region,
-        element: &FieldInElement,
-        field: &str,
-        trilinear: bool,
-    ) -> Result<Vec<Sum>> {
-        if let Some(shape) = &self.templates[element.element.template].other_shape {
-            let construct = format!("an element of shape `{shape}`");
-            return Err(unsupported(construct, "only cubes (line*line*line) are read", &element.element.place));
-        }
-        let system = &element.line.system;
-        if system != "rectangular cartesian" {
-            return Err(unsupported(
-                format!("the {system} coordinates of field `{field}`"),
-                "convert the field to rectangular cartesian coordinates first: inside elements the conversion is no \
-                 polynomial, so it is a fit and not a reading",
-                &element.components[0].place,
-            ));
-        }
-        let [x, y, z] = element.components else { return Ok(Vec::new()) };
-        let first = self.sums(region, element, field, 0, trilinear)?;
-        for (index, component) in [(1, y), (2, z)] {
-            if self.sums(region, element, field, index, trilinear)? != first {
-                return Err(unsupported(
-                    format!(
-                        "components `{}` and `{}` of field `{field}` that use different parameters in element {}",
-                        x.name, component.name, element.element.identifier
-                    ),
-                    "give all components the same basis, labels and scale factors",
-                    &component.place,
-                ));
-            }
-        }
-        Ok(first)
-    }
-
-    /// The element parameters of one component in the mesh's basis.
-    pub(super) fn sums(
-        &self,
-        region: &Region,
-        element: &FieldInElement,
-        field: &str,
-        index: usize,
-        trilinear: bool,
-    ) -> Result<Vec<Sum>> {
-        let component = &element.components[index];
-        let basis = component.basis.clone().map_err(|construct| unsupported(
-            construct,
-            "bases that are products of l.Lagrange, q.Lagrange, c.Lagrange and c.Hermite are read, node based and unmodified",
-            &component.place,
-        ))?;
-        let mut functions: Vec<Sum> = Vec::with_capacity(component.functions.len());
-        for terms in &component.functions {
-            let mut sum = Sum::new();
-            for term in terms {
-                let node = element.element.nodes[term.node];
-                let (label, version) = match term.source {
-                    Source::Label(label, version) => (label, version),
-                    Source::Index(place) => {
-                        let parameters = self.node(region, field, node, &element.element.place)?.get(index);
-                        let parameter = parameters.and_then(|parameters| parameters.get(place - 1));
-                        parameter.map(|parameter| (parameter.label, parameter.version)).ok_or_else(|| {
-                            missing(
-                                format!("value {place} of component `{}` at node {node}", component.name),
-                                &element.element.place,
-                            )
-                        })?
-                    }
-                };
-                let scale = term.scales.iter().map(|scale| element.element.scale_factors[*scale]).product();
-                add(&mut sum, (node, version, label), scale);
-            }
-            functions.push(sum);
-        }
-        if trilinear || basis.is_tricubic_hermite() {
-            return Ok(functions);
-        }
-        let composed = basis.hermite_weights().into_iter().map(|weights| {
-            let mut sum = Sum::new();
-            for (function, weight) in weights {
-                for (key, scale) in &functions[function] {
-                    add(&mut sum, *key, weight * scale);
-                }
-            }
-            sum
-        });
-        Ok(composed.collect())
-    }
-
-    fn node<'f>(&'f self, region: &'f Region, field: &str, node: i64, place: &Place) -> Result<&'f NodeField> {
-        let fields = region.nodes.get(&node).ok_or_else(|| missing(format!("node {node}"), place))?;
-        fields.get(field).ok_or_else(|| missing(format!("field `{field}` at node {node}"), place))
-    }
-
-    /// The value of a nodal parameter.
-    pub(super) fn value(&self, region: &Region, field: &str, component: usize, key: Key) -> Result<f64> {
-        let (node, version, label) = key;
-        let whole = Place::whole(&self.file);
-        let parameters = self.node(region, field, node, &whole)?.get(component);
-        let mut parameters = parameters.into_iter().flatten();
-        let found = parameters.find(|parameter| (parameter.version, parameter.label) == (version, label));
-        found.map(|parameter| parameter.value).ok_or_else(|| {
-            let label = LABELS[usize::from(label)];
-            missing(
-                format!(
-                    "{label} (version {version}) of component {} of field `{field}` at node {node}",
-                    component + 1
-                ),
-                &whole,
-            )
-        })
-    }
 }
 
-/// Adds scale x key to a sum; equal keys are added up and a scale of 0 is left out.
-fn add(sum: &mut Sum, key: Key, scale: f64) {
-    match sum.iter().position(|(known, _)| *known == key) {
-        Some(place) => sum[place].1 += scale,
-        None => sum.push((key, scale)),
-    }
-    sum.retain(|(_, scale)| *scale != 0.0);
+/// The node whose value each corner of an element is, as far as it is one.
+fn corner_nodes(sums: &[Sum], basis: &dyn Element) -> [Option<i64>; 8] {
+    std::array::from_fn(|corner| match sums[corner * basis.parameters_per_node()][..] {
+        [((node, _, 0), 1.0)] => Some(node),
+        _ => None,
+    })
 }
 
 fn named_faces(mesh: &Mesh, identifiers: &[i64]) -> BTreeMap<String, Vec<Face>> {
@@ -312,12 +228,4 @@ fn named_faces(mesh: &Mesh, identifiers: &[i64]) -> BTreeMap<String, Vec<Face>> 
         }
     }
     named
-}
-
-pub(super) fn unsupported(construct: String, help: &'static str, place: &Place) -> Error {
-    Error::ExUnsupported { construct, help, place: Box::new(place.clone()) }
-}
-
-pub(super) fn missing(what: String, place: &Place) -> Error {
-    Error::ExMissing { what, place: Box::new(place.clone()) }
 }

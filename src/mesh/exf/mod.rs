@@ -6,21 +6,32 @@
 //! cubic Lagrange is exact in cubic Hermite form, where its derivatives are differences of its values. The displacement of a
 //! host has the map of its geometry, so it is of that lower order there too.
 //!
-//! What cannot be said in one map for all three components is refused with its file, line and construct: curvilinear
-//! coordinates (a polynomial in prolate coordinates is none in x, y, z), components with maps of their own, simplices,
-//! grids, hanging corners.
+//! [`ExFile::coordinates`] evaluates a field as the file means it: in its coordinate system, every component on a map and a
+//! basis of its own, angles unwound. [`ExFile::geometry`] makes a mesh of it for the mechanics, which needs one map in x, y
+//! and z: it is the same shape wherever the field is a polynomial in x, y, z, and of curvilinear coordinates it is the
+//! Hermite with the same values and derivatives at the corners of every element.
+//!
+//! Refused with file, line and construct: other systems of coordinates, simplices, grids, hanging corners.
 //!
 //! Version 1 keeps nodes and elements in two files; one file that holds both, one after the other, is read here.
 
 mod angles;
 mod basis;
+mod convert;
+mod coordinates;
 mod elements;
 mod file;
 mod geometry;
+mod jet;
 mod lines;
 mod nodes;
+mod sums;
+mod system;
+mod theta;
 mod write;
 
+pub use convert::Conversion;
+pub use coordinates::Coordinates;
 pub use file::ExFile;
 pub use geometry::Geometry;
 pub use write::{Points, write_mesh, write_points};

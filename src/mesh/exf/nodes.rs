@@ -13,6 +13,8 @@ pub(super) struct FieldLine {
     pub is_coordinate: bool,
     /// The coordinate system.
     pub system: String,
+    /// The distance of the focus of a spheroidal system, `focus=`.
+    pub focus: Option<f64>,
     /// Whether its values are numbers that stand at nodes.
     pub numeric: bool,
     /// Whether its values stand in the header.
@@ -69,6 +71,7 @@ impl FieldLine {
                 name: name.into(),
                 is_coordinate: kind == "coordinate",
                 system: system.map_or("none", |part| part.split("focus").next().unwrap_or(part).trim()).into(),
+                focus: focus(&parts)?,
                 numeric: !in_header && !parts.iter().any(other),
                 in_header,
                 components: number_after(rest, "#Components").filter(|count| (1..=1000).contains(count))?,
@@ -76,6 +79,13 @@ impl FieldLine {
         };
         read().ok_or_else(|| lines.wrong(EXPECTED))
     }
+}
+
+/// The number of `focus=35.2`, which stands in a part of its own or in that of the system; `None` where it is no number.
+fn focus(parts: &[&str]) -> Option<Option<f64>> {
+    let Some((_, number)) = parts.iter().find_map(|part| part.split_once("focus")) else { return Some(None) };
+    let number = number.trim_start().strip_prefix('=')?.trim().parse::<f64>().ok()?;
+    (number.is_finite() && number > 0.0).then_some(Some(number))
 }
 
 impl NodeTemplate {
