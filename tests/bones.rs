@@ -141,7 +141,9 @@ fn what_is_on_a_bone_alone_moves_rigidly() {
     let free = STRIP.replace("clamp = { face = \"xi1=0\" }", "clamp = { face = \"xi1=0\", bone = \"jaw\" }");
     let deep = "[[sliding]]\nface = \"xi3=0\"\nsurface = { reference = true }\nbone = \"jaw\"\n";
     let law = "law = { augmented = { kpa_per_mm = 50, gap_mm = 1e-6 } }\n";
-    let Built { model, warnings, .. } = built(&[&free, deep, law, SPRING, TIE]);
+    // one tie is redundant: its point lies on a face that the jaw carries
+    let again = TIE.replace("[22, 3, 10]", "[0, 5, 5]");
+    let Built { model, warnings, .. } = built(&[&free, deep, law, SPRING, TIE, &again]);
     assert!(warnings.is_empty(), "{warnings:?}");
     let found = solve(&model, [0.0, 35.0, 5.0]);
     let [bone] = model.bones() else { panic!("one bone") };
@@ -153,6 +155,14 @@ fn what_is_on_a_bone_alone_moves_rigidly() {
     assert!(energy < 1e-12 * scale, "energy {energy} uJ of {scale}");
     let state = bone_states(&model, &found.state, &found.evaluation)[0];
     assert!(state.torque.expect("a hinge").abs() < 1e-9 * scale && norm(state.force) < 1e-9 * scale, "{state:?}");
+    let rates = solver(&model).rates(&found.state, &[1, 2]).expect("a regular tangent");
+    for (control, rate) in [1, 2].into_iter().zip(&rates) {
+        let twist = bone.twist(control, &found.state.controls).expect("its own");
+        let du = model.displacement_rate(&found.state, control, rate);
+        let moved: Vec<f64> = points(&model).flat_map(|point| model.mesh().interpolate(point, &du)).collect();
+        let places = points(&model).map(|point| pose.place(model.mesh().position(point)));
+        assert_close("rates", &moved, &places.flat_map(|x| twist.velocity(x)).collect::<Vec<f64>>(), 1e-8);
+    }
     let mut last = 0.0;
     for place in found.history.iter().map(|step| step.place) {
         assert!((place - last) * 35.0 <= 22.5 + 1e-9, "a step of {} degrees", (place - last) * 35.0);
@@ -176,10 +186,10 @@ fn steps_of_a_path_turn_a_bone_by_no_more_than_they_may() {
 
 /// All that a jaw carries at once, and a muscle: implicit sensitivities of all places, those on the jaw too, against
 /// differences of whole equilibria; torque and force of the jaw against differences of the energy.
-fn check(name: &str, parts: &[&str], scale: f64, tolerance: f64) {
+fn check(name: &str, parts: &[&str], at: [f64; 3], scale: f64, tolerance: f64) {
     // without the passive force, whose kink at stretch 1 differences would see
     let Built { model, .. } = built(&[&parts.concat().replace("p1 = 0.005", "p1 = 0")]);
-    let found = solve(&model, [0.02, 4.0, 0.8]);
+    let found = solve(&model, at);
     let closed = |found: &Equilibrium| -> Vec<bool> {
         let pressed =
             |term: usize| model.contact_points(&found.state, term).iter().map(|p| p.pressure != 0.0).collect();
@@ -213,24 +223,67 @@ fn check(name: &str, parts: &[&str], scale: f64, tolerance: f64) {
     assert!(active.is_empty() || (pressed > 0 && pressed < active.len()), "{name}: {pressed} points are closed");
 }
 
+const AT: [f64; 3] = [0.02, 4.0, 0.8];
+
 #[test]
 fn sensitivities_and_reactions_of_a_face() {
-    check("face", &[STRIP, FACE], 1.0, 1e-6);
+    check("face", &[STRIP, FACE], AT, 1.0, 1e-6);
 }
 
 #[test]
 fn sensitivities_and_reactions_of_springs_and_ties() {
-    check("springs", &[STRIP, SPRING], 1.0, 1e-6);
-    check("ties", &[STRIP, TIE], 1.0, 1e-6);
+    check("springs", &[STRIP, SPRING], AT, 1.0, 1e-6);
+    check("ties", &[STRIP, TIE], AT, 1.0, 1e-6);
 }
 
 #[test]
 fn sensitivities_and_reactions_of_everything_at_once() {
     let ball = BALL.replace("[20, 5, -20.5], radius_mm = 20", "[20, 5, -50.1], radius_mm = 50");
-    check("all, penalty", &[STRIP, FACE, &ball, SPRING, TIE], 1.0, 1e-6);
+    check("all, penalty", &[STRIP, FACE, &ball, SPRING, TIE], AT, 1.0, 1e-6);
     // stiff, so that differences of equilibria see little of the gap that is left
     let ball = ball.replace("penalty = { kpa_per_mm = 20 }", "augmented = { kpa_per_mm = 4000, gap_mm = 1e-9 }");
-    check("all, augmented", &[STRIP, FACE, &ball, SPRING, TIE], 0.3, 1e-5);
+    check("all, augmented", &[STRIP, FACE, &ball, SPRING, TIE], AT, 0.3, 1e-5);
+}
+
+/// A jaw closes one lip on the other: both yield, and the motion of the lower one goes through their contact.
+#[test]
+fn sensitivities_and_reactions_of_lips() {
+    const LIPS: &str = r#"
+[task]
+kind = "forward"
+[mesh]
+blocks = [{ name = "lower", origin_mm = [0, 0, 0], size_mm = [20, 10, 9], elements = [2, 1, 1] },
+          { name = "upper", origin_mm = [0, 0, 9.3], size_mm = [20, 10, 9], elements = [2, 1, 1] }]
+[tissue]
+mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
+gauss = 4
+[[muscle]]
+name = "slab"
+block = { origin_mm = [3, 2, 12], size_mm = [14, 6, 3], elements = [2, 1, 1] }
+fibre_angles_deg = [0, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[bone]]
+name = "jaw"
+hinge = { axis = [0, 1, 0], through_mm = [25, 0, 0], bounds_deg = [-5, 10] }
+slide = { direction = [0, 0, 1], bounds_mm = [-1, 2] }
+[[support]]
+clamp = { face = "upper:xi3=1" }
+[[support]]
+clamp = { face = "lower:xi3=0", bone = "jaw" }
+[[contact]]
+face = "upper:xi3=0"
+surface = { faces = { face = "lower:xi3=1" } }
+"#;
+    let at = [0.01, 3.0, 0.1];
+    check("lips, penalty", &[LIPS, "law = { penalty = { kpa_per_mm = 5 } }"], at, 0.3, 1e-5);
+    // few points: more than the lips can follow would be closed slowly
+    check(
+        "lips, augmented",
+        &[LIPS, "law = { augmented = { kpa_per_mm = 4000, gap_mm = 1e-9 } }\ngauss = 2"],
+        at,
+        0.3,
+        1e-5,
+    );
 }
 
 /// The sensitivities by differences that the fit offers agree too; the hinge stands on its lower bound.
@@ -257,7 +310,7 @@ fn a_rigid_tie_is_an_endless_spring() {
     let rigid = solve(&model, at);
     let x = model.current(&rigid.state);
     let spec = scene(&[STRIP, TIE]).attachments[0].position_mm;
-    let on = risorius::mesh::location::Locator::new(model.mesh()).locate(spec).ok().expect("inside");
+    let Ok(on) = risorius::mesh::location::Locator::new(model.mesh()).locate(spec) else { panic!("it is inside") };
     let anchor = model.bones()[0].pose(&rigid.state.controls).place(spec);
     let gap = norm(subtract(model.mesh().interpolate(on, &x), anchor));
     assert!(gap < 1e-8, "gap {gap} mm");

@@ -467,3 +467,59 @@ fn ctrl_c_keeps_every_finished_frame() {
     assert_eq!(markers.lines().count(), 1 + 12 * frames);
     assert!(folder.path().join("run/manifest.json").is_file() && folder.path().join("run/tables/cost.csv").is_file());
 }
+
+/// A cube of muscle under a dead force that stretches it by half: its activation passes a limit, and it shortens at once.
+const SNAPPING: &str = r#"
+[task]
+kind = "forward"
+[mesh]
+block = { origin_mm = [0, 0, 0], size_mm = [10, 10, 10], elements = [1, 1, 1] }
+[tissue]
+mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
+[[muscle]]
+name = "all"
+block = { origin_mm = [0, 0, 0], size_mm = [10, 10, 10], elements = [1, 1, 1] }
+fibre_angles_deg = [0, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[support]]
+symmetry = { face = "xi1=0" }
+[[support]]
+symmetry = { face = "xi2=0" }
+[[support]]
+symmetry = { face = "xi3=0" }
+[[load]]
+traction = { face = "xi1=1", kpa = [34.73, 0, 0] }
+[controls]
+all = { csv = "curves.csv" }
+"#;
+
+#[test]
+fn a_run_tells_of_snaps_of_descending_fibres_and_of_failed_steps() {
+    let folder = folder();
+    fs::write(folder.path().join("snapping.toml"), SNAPPING).unwrap();
+    fs::write(folder.path().join("curves.csv"), "time_s,all\n0,0\n0.1,0.15\n").unwrap();
+    let told = stderr(&folder, &["run", "snapping.toml", "--out", "snap", "--color", "never"], 0);
+    assert!(told.contains("warn[S007]: frame 1 at 0.100 s: the body snapped"), "{told}");
+    let status = json(&folder, "snap/status.json");
+    assert_eq!((&status["status"], &status["frames_ok"]), (&"converged".into(), &2.into()), "{status}");
+    assert_eq!((&status["warnings"][0]["code"], &status["warnings"][0]["frame"]), (&"S007".into(), &1.into()));
+    assert!(text(&folder, "snap/tables/convergence.csv").contains(",snapped,"));
+    let stretch = column(&text(&folder, "snap/tables/muscles.csv"), "stretch_mean");
+    assert!((stretch[0] - 1.5).abs() < 1e-3 && stretch[1] < 1.0, "{stretch:?}");
+    stderr(&folder, &["run", "snapping.toml", "--out", "strict", "--strict"], 5);
+
+    // held at that length instead, its fibres lose force as they lengthen
+    let held = SNAPPING.replace("[[load]]\ntraction = { face = \"xi1=1\", kpa = [34.73, 0, 0] }", HELD);
+    fs::write(folder.path().join("held.toml"), held).unwrap();
+    fs::write(folder.path().join("curves.csv"), "time_s,all\n0,0\n0.1,0.35\n").unwrap();
+    let told = stderr(&folder, &["run", "held.toml", "--out", "held", "--color", "never"], 0);
+    assert!(told.contains("warn[S008]: frame 1 at 0.100 s:") && told.contains("of muscle `all`"), "{told}");
+    let points = column(&text(&folder, "held/tables/muscles.csv"), "descending_points");
+    assert!(points[0] == 0.0 && points[1] > 0.0, "{points:?}");
+
+    let arguments = [&["run", "cantilever.toml", "--out", "hopeless"], &HOPELESS[..]].concat();
+    stderr(&folder, &arguments, 4);
+    assert!(text(&folder, "hopeless/tables/convergence.csv").contains(",failed,"), "the failed step is kept");
+}
+
+const HELD: &str = "[[support]]\nplate = { face = \"xi1=1\", offset_mm = 4.8 }";

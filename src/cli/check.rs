@@ -50,6 +50,9 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
         });
         text += &format!("  bone {:<15} {}\n", bone.name, ranges.collect::<Vec<_>>().join(", "));
     }
+    let effects = scene.effects();
+    let off: Vec<&str> = effects.iter().filter(|(_, count)| *count == 0).map(|(effect, _)| *effect).collect();
+    text += &format!("effects off: {}\n", off.join(", "));
     text += &format!(
         "one Newton iteration: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
         model.factor_flops() / 1e6,

@@ -1,12 +1,13 @@
 //! Task `fit`: activations from a recording, frame after frame.
 
 use super::Flags;
-use super::forward::{probes, saddle};
+use super::forward::probes;
+use super::noticed::noticed;
 use super::prepare::Clip;
 use super::progress::Meter;
 use super::run::{Run, Tally};
 use super::terminal::print;
-use crate::cli::diagnostics::{render_error, render_warning};
+use crate::cli::diagnostics::render_error;
 use crate::error::Result;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
@@ -54,12 +55,7 @@ pub(super) fn fit(
                     estimate.iterations.len(),
                     fit.work().linear.factorisations - before
                 ));
-                if let Some(modes) = estimate.equilibrium.negative_modes.filter(|modes| *modes > 0) {
-                    tally.warned = true;
-                    if flags.shows_warnings() {
-                        meter.say(&render_warning(&saddle(frame, modes), flags.colour()));
-                    }
-                }
+                tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
                 fitted.push(FittedFrame {
                     frame,
                     values: estimate.equilibrium.state.controls.clone(),

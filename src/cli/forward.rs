@@ -1,11 +1,12 @@
 //! Task `forward`: equilibria for given activations, one after the other in time.
 
 use super::Flags;
+use super::noticed::noticed;
 use super::progress::Meter;
 use super::run::{Run, Tally};
 use super::terminal::print;
-use crate::cli::diagnostics::{render_error, render_warning};
-use crate::error::{Result, Warning};
+use crate::cli::diagnostics::render_error;
+use crate::error::Result;
 use crate::fit::sequence::settings;
 use crate::forward::drives::drives;
 use crate::forward::{Equilibrium, Solver, Work};
@@ -42,12 +43,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
                     "t {time_s:.3} s: {iterations} iterations, det F {:.3} to {:.3}",
                     range.min, range.max
                 ));
-                if let Some(modes) = found.negative_modes.filter(|modes| *modes > 0) {
-                    tally.warned = true;
-                    if flags.shows_warnings() {
-                        meter.say(&render_warning(&saddle(frame, modes), flags.colour()));
-                    }
-                }
+                tally.warn(frame, noticed(frame, model, &found), &mut meter, flags);
                 state.clone_from(&found.state);
                 last = Some((frame, found));
             }
@@ -94,19 +90,6 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
         print(&page)?;
     }
     Ok(tally)
-}
-
-/// An equilibrium that a small push would leave.
-pub(super) fn saddle(frame: Frame, modes: usize) -> Warning {
-    Warning {
-        code: "S005",
-        message: format!(
-            "frame {} at {:.3} s is an equilibrium that is not stable: its tangent has {modes} negative modes",
-            frame.index, frame.time_s
-        ),
-        place: None,
-        help: Some("the body would buckle here: approach it in shorter steps (--set solver.step_max=0.05)".into()),
-    }
 }
 
 /// The probes of a scene with the places that were found for them.

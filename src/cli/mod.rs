@@ -8,6 +8,7 @@ pub mod diagnostics;
 mod fit;
 mod forward;
 mod inspect;
+mod noticed;
 mod prepare;
 mod problem;
 mod progress;

@@ -3,14 +3,16 @@
 use super::check::describe;
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
+use super::progress::Meter;
 use super::terminal::tell;
 use super::{Ending, Flags, fit, forward, study};
-use crate::error::{Error, Result};
+use crate::cli::diagnostics::render_warning;
+use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
 use crate::model::Model;
 use crate::model::build::Built;
 use crate::report::manifest::Input;
-use crate::report::{FailedFrame, Manifest, RunFolder, Status};
+use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Task};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,8 +33,20 @@ pub(super) struct Tally {
     pub frames_ok: usize,
     pub failed: Vec<FailedFrame>,
     pub interrupted: bool,
-    /// A warning came up on the way.
-    pub warned: bool,
+    /// What came up on the way.
+    pub warnings: Vec<FrameWarning>,
+}
+
+impl Tally {
+    /// Shows what a frame gave notice of, and keeps it.
+    pub fn warn(&mut self, frame: Frame, warnings: Vec<Warning>, meter: &mut Meter, flags: &Flags) {
+        for warning in warnings {
+            if flags.shows_warnings() {
+                meter.say(&render_warning(&warning, flags.colour()));
+            }
+            self.warnings.push(FrameWarning::new(frame.index, &warning));
+        }
+    }
 }
 
 impl Run {
@@ -43,7 +57,8 @@ impl Run {
 
     /// Writes how the run stands.
     pub fn write_running(&self, tally: &Tally) -> Result<()> {
-        Status::running(tally.frames_ok, tally.failed.clone()).write(&self.folder)
+        let warnings = tally.warnings.clone();
+        Status { warnings, ..Status::running(tally.frames_ok, tally.failed.clone()) }.write(&self.folder)
     }
 
     fn manifest(&self, model: Option<&Model>, work: &Work) -> Result<()> {
@@ -133,10 +148,10 @@ pub(super) fn finish(
     run.manifest(model, work)?;
     match outcome {
         Ok(tally) => {
-            let Tally { frames_ok, failed, interrupted, warned } = tally;
+            let Tally { frames_ok, failed, interrupted, warnings } = tally;
             let ending = match failed.len() {
                 _ if interrupted => Ending::Interrupted,
-                0 if warned && strict => Ending::Warned,
+                0 if !warnings.is_empty() && strict => Ending::Warned,
                 0 => Ending::Ok,
                 _ => Ending::NotConverged,
             };
@@ -156,7 +171,7 @@ pub(super) fn finish(
                 true => Status::interrupted(frames_ok, failed),
                 false => Status::finished(frames_ok, failed),
             };
-            Status { exit: Some(ending.exit_code()), ..status }.write(&run.folder)?;
+            Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
             Ok(ending)
         }
         Err(error) => {

@@ -3,12 +3,14 @@
 //! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
 //! `O` output. A code never changes its meaning; a retired code is not used again.
 
+mod likely;
 mod place;
 mod recording;
 mod remedy;
 
 use std::path::PathBuf;
 
+pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
 use recording::{encapsulation_name, list_topics};
@@ -607,8 +609,9 @@ pub enum Error {
     NotFactored,
     /// Newton's method found no equilibrium on the way to the asked load and controls.
     #[error(
-        "no equilibrium beyond {:.2} % of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN",
-        100.0 * reached
+        "no equilibrium beyond {:.2} % of the way to the asked load and controls ({reason}; step cut {cuts} times, now {step:.1e})\n  worst point: element {element}, Gauss point {point}: det F = {det_f:.4}; residual {residual:.2e} mN, required {required:.1e} mN{}",
+        100.0 * reached,
+        likely::below(likely)
     )]
     NotConverged {
         /// Part of the way, 0 to 1, at which the last equilibrium was found.
@@ -629,6 +632,8 @@ pub enum Error {
         residual: f64,
         /// The norm required, mN.
         required: f64,
+        /// What the last iterate shows of the cause.
+        likely: Option<Box<Likely>>,
     },
     /// Multipliers did not close a gap.
     #[error(

@@ -1,6 +1,6 @@
 //! The remedy of every error: the edit or the command that mends it.
 
-use super::Error;
+use super::{Error, Likely};
 
 impl Error {
     /// The edit or command that mends it, where one is known.
@@ -129,6 +129,18 @@ impl Error {
                 "raise kpa_per_mm of its law, or gap_mm: the elements may be too large to follow the surface more closely"
                     .into(),
             ),
+            Error::NotConverged { likely: Some(likely), .. } => Some(match **likely {
+                Likely::OffSurface { .. } => {
+                    "hold the face so that it stays on its surface, or slide it on a plane, sphere or cylinder, which have \
+                     no edge"
+                        .into()
+                }
+                Likely::DescendingLimb { .. } => {
+                    "the last equilibrium is kept; lower the activation, stretch the muscle less, or raise lambda_ofl if its \
+                     fibres are longer at rest"
+                        .into()
+                }
+            }),
             Error::NotConverged { .. } => Some(
                 "the last equilibrium is kept; let the steps become shorter (--set solver.step_min=1e-6), or try a volumetric \
                  term (tissue.kappa_kpa), a finer mesh where det F is small, a smaller load or activation"

@@ -81,7 +81,7 @@ impl<'m> Fit<'m> {
     pub fn new(model: &'m Model, scene: &Scene, fit: &FitSpec, recording: &Recording) -> Result<Fit<'m>> {
         let markers = place(scene, fit, model.mesh(), recording)?;
         check_units(&markers, model.mesh(), recording, fit)?;
-        let settings = settings(scene);
+        let settings = Settings { release: false, ..settings(scene) };
         let mut solver = Solver::new(model, settings)?;
         let unknowns: Vec<usize> = fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect();
         let mut held = vec![0.0; model.controls().len()];
@@ -286,7 +286,13 @@ fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
 /// The solver settings of a scene.
 pub fn settings(scene: &Scene) -> Settings {
     let s = &scene.solver;
-    Settings { tolerance: s.tolerance, max_iterations: s.max_iterations, step_max: s.step_max, step_min: s.step_min }
+    Settings {
+        tolerance: s.tolerance,
+        max_iterations: s.max_iterations,
+        step_max: s.step_max,
+        step_min: s.step_min,
+        ..Settings::default()
+    }
 }
 
 /// argmin wraps errors; ours come out again as they went in.

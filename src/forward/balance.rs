@@ -3,7 +3,8 @@
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
 use crate::math::factor::{self, Factor};
-use crate::model::{Evaluation, Model, State, Tangent, Workspace, WorstPoint};
+use crate::math::sparse::SymmetricMatrix;
+use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Equations};
 use crate::term::Want;
 use std::sync::Arc;
@@ -42,7 +43,30 @@ pub(super) struct Balance<'m> {
     lifted_gap: Option<Vec<[f64; 3]>>,
     lifted: Option<Vec<f64>>,
     worst: WorstPoint,
+    /// Where a face had left its surface in a state that was not admissible for that; the last since it was cleared.
+    pub off_surface: Option<OffSurface>,
+    /// Holds the body back while it is let go.
+    pub drag: Option<Drag>,
     work: Work,
+}
+
+/// Forces strength x D (x - from) on the unknowns.
+#[derive(Clone)]
+pub(super) struct Drag {
+    pub strength: f64,
+    /// D, mN/mm: the stiffness at rest, without rows and columns of pressures.
+    pub stiffness: Arc<SymmetricMatrix>,
+    /// The unknowns where it is at rest.
+    pub from: Vec<f64>,
+}
+
+impl Drag {
+    /// D v
+    pub fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut product = vec![0.0; v.len()];
+        self.stiffness.multiply(v, &mut product);
+        product
+    }
 }
 
 /// A Newton step: free unknowns, and the prescribed motion that comes with it.
@@ -69,6 +93,8 @@ impl<'m> Balance<'m> {
             lifted_gap: None,
             lifted: None,
             worst: WorstPoint { min: 1.0, element: 0, point: 0, max: 1.0 },
+            off_surface: None,
+            drag: None,
             work: Work { points: vec![0; terms], term_seconds: vec![0.0; terms], ..Work::default() },
         })
     }
@@ -144,6 +170,31 @@ impl<'m> Balance<'m> {
         let moved = controls.iter().map(|control| model.constraint_control_rate(state, *control)).collect();
         self.solve_held(state, &mut rhs, moved)?;
         Ok(rhs)
+    }
+
+    /// Factorises the tangent at a state, to see its negative modes.
+    pub fn inspect(&mut self, state: &State) -> Result<()> {
+        self.evaluate(state, Want::Stiffness, None);
+        self.assemble();
+        self.refactor()
+    }
+
+    /// The stiffness of the body at rest without its pressures.
+    pub fn stiffness_at_rest(&mut self) -> SymmetricMatrix {
+        let model = self.model;
+        self.evaluate(&model.rest(), Want::Stiffness, None);
+        self.assemble();
+        self.factored = false;
+        let mut matrix = self.tangent.matrix.clone();
+        let mut kept = vec![true; model.numbering().unknowns()];
+        (0..model.numbering().pressures()).for_each(|k| kept[model.numbering().pressure_unknown(k)] = false);
+        matrix.keep(&kept);
+        matrix
+    }
+
+    /// K x = b with the tangent that is factorised.
+    pub fn solve_factored(&mut self, rhs: &mut [f64]) -> Result<()> {
+        self.factor.solve(&self.tangent.matrix, rhs, 1, STEP_TOLERANCE).map(|_| ())
     }
 
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
@@ -222,7 +273,13 @@ impl<'m> Balance<'m> {
 
     fn evaluate(&mut self, state: &State, want: Want, gap: Option<&[[f64; 3]]>) -> Evaluation {
         let start = Instant::now();
-        let evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
+        let mut evaluation = self.model.evaluate(state, want, gap, &mut self.workspace);
+        if let Some(drag) = &self.drag {
+            let moved: Vec<f64> =
+                self.model.unknowns(state).iter().zip(&drag.from).map(|(x, from)| x - from).collect();
+            let force = drag.times(&moved);
+            evaluation.residual.iter_mut().zip(force).for_each(|(r, f)| *r += drag.strength * f);
+        }
         self.work.assembly_seconds += seconds_since(start);
         match want {
             Want::Force => self.work.force_evaluations += 1,
@@ -240,6 +297,9 @@ impl<'m> Balance<'m> {
     fn assemble(&mut self) {
         let start = Instant::now();
         self.model.assemble(&self.workspace, &mut self.tangent);
+        if let Some(drag) = &self.drag {
+            self.tangent.matrix.add_scaled(drag.strength, &drag.stiffness);
+        }
         self.work.assembly_seconds += seconds_since(start);
     }
 
@@ -294,10 +354,14 @@ impl Equations for Balance<'_> {
         self.worst = evaluation.det_f;
         let residual = self.norm(&evaluation.residual);
         self.residual = evaluation.residual;
+        let admissible = evaluation.det_f.min > 0.0 && residual.is_finite();
+        if !admissible && evaluation.det_f.min > 0.0 {
+            self.off_surface = self.model.off_surface(state);
+        }
         Assessment {
             residual,
             required: self.tolerance * evaluation.magnitude + ROUNDING * self.model.force_scale(),
-            admissible: evaluation.det_f.min > 0.0 && residual.is_finite(),
+            admissible,
             outstanding: self.gap.is_some(),
         }
     }

@@ -2,9 +2,10 @@
 
 mod balance;
 pub mod drives;
+mod release;
+mod work;
 
-use crate::error::{Error, Result};
-use crate::math::factor;
+use crate::error::{Error, Likely, Result};
 use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, Test, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
@@ -13,6 +14,9 @@ use crate::term::bone::Bone;
 use balance::Balance;
 use std::sync::Arc;
 use std::time::Instant;
+
+pub use release::Snap;
+pub use work::Work;
 
 /// First and longest step of a path, as changes of ln(activation + onset): the response is about even in it.
 const FIRST_STEP: f64 = 0.5;
@@ -27,6 +31,8 @@ const SHORT_FOR_A_JUMP: f64 = 0.02;
 /// Rounds of multipliers before a gap counts as one that does not close.
 const MULTIPLIER_ROUNDS: usize = 200;
 const LONGEST_STEP: f64 = 2.0;
+/// How far beyond the last equilibrium that could be reached the body is let go, as a part of the path.
+const BEYOND_A_LIMIT: f64 = 0.01;
 /// A support or a bone rotates by no more than this in one step, radians.
 const LARGEST_ROTATION: f64 = std::f64::consts::PI / 8.0;
 
@@ -50,61 +56,51 @@ pub struct Settings {
     pub step_max: f64,
     /// Shortest step.
     pub step_min: f64,
+    /// Whether a body that loses its balance on the path is let go ([`Snap`]). The answer then jumps with the controls, which
+    /// a fit cannot use.
+    pub release: bool,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4, release: true }
     }
 }
 
-/// One converged step of a path.
+/// One step of a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// Where on the path, 0 to 1.
     pub place: f64,
+    /// How it was made.
+    pub kind: StepKind,
     /// Newton iterations of the step.
     pub iterations: Vec<Iteration>,
-    /// Residual at the end, mN.
+    /// Residual at the end, mN; above what is required only where it is rounding, or in a failed step.
     pub residual: f64,
     /// The residual required, mN.
     pub required: f64,
 }
 
-/// Work done, in counts and seconds.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Work {
-    /// Newton iterations, failed steps included.
-    pub iterations: usize,
-    /// Evaluations of energy and force in all elements.
-    pub force_evaluations: usize,
-    /// Evaluations with stiffness, each followed by an assembly.
-    pub assemblies: usize,
-    /// Steps of paths that failed and were cut.
-    pub cuts: usize,
-    /// Quadrature points evaluated, one count per term.
-    pub points: Vec<usize>,
-    /// Time in each term, summed over threads, s.
-    pub term_seconds: Vec<f64>,
-    /// Wall time of evaluations and assemblies, s.
-    pub assembly_seconds: f64,
-    /// Factorisations and solves.
-    pub linear: factor::Work,
+/// How a step of a path was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepKind {
+    /// By Newton's method from the step before.
+    Walked,
+    /// The body was let go where the path turned back, or left a saddle: see [`Snap`].
+    Snapped,
+    /// It did not converge.
+    Failed,
 }
 
-impl Work {
-    /// Adds what was done elsewhere.
-    pub fn add(&mut self, other: &Work) {
-        self.iterations += other.iterations;
-        self.force_evaluations += other.force_evaluations;
-        self.assemblies += other.assemblies;
-        self.cuts += other.cuts;
-        self.points.resize(self.points.len().max(other.points.len()), 0);
-        self.points.iter_mut().zip(&other.points).for_each(|(a, b)| *a += b);
-        self.term_seconds.resize(self.term_seconds.len().max(other.term_seconds.len()), 0.0);
-        self.term_seconds.iter_mut().zip(&other.term_seconds).for_each(|(a, b)| *a += b);
-        self.assembly_seconds += other.assembly_seconds;
-        self.linear += other.linear;
+impl StepKind {
+    /// The word in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            StepKind::Walked => "walked",
+            StepKind::Snapped => "snapped",
+            StepKind::Failed => "failed",
+        }
     }
 }
 
@@ -117,6 +113,8 @@ pub struct Equilibrium {
     pub evaluation: Evaluation,
     /// Steps of the path to it.
     pub history: Vec<Step>,
+    /// Where the body lost its balance on the path and came to another state.
+    pub snaps: Vec<Snap>,
     /// Negative eigenvalues of the tangent beyond one per pressure, at the last factorisation: more than none means a
     /// saddle. `None` where nothing had to be factorised.
     pub negative_modes: Option<usize>,
@@ -133,6 +131,8 @@ pub struct Failure {
     pub reached: f64,
     /// The iterate at which Newton's method gave up.
     pub failed: State,
+    /// Steps of the path, the failed one at the end.
+    pub history: Vec<Step>,
 }
 
 impl From<Box<Failure>> for Error {
@@ -191,8 +191,8 @@ impl<'m> Solver<'m> {
         if self.balance.has_tangent() {
             let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
             if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
-                let history = vec![step(1.0, outcome.last, outcome.iterations)];
-                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                let history = vec![step(1.0, StepKind::Walked, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history, Vec::new()) {
                     return Ok(found);
                 }
             }
@@ -205,8 +205,8 @@ impl<'m> Solver<'m> {
         if let Ok(outcome) = self.solve(guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {
-                let history = vec![step(1.0, outcome.last, outcome.iterations)];
-                if let Ok(found) = self.close_gaps(outcome.state, history) {
+                let history = vec![step(1.0, StepKind::Walked, outcome.last, outcome.iterations)];
+                if let Ok(found) = self.close_gaps(outcome.state, history, Vec::new()) {
                     return Ok(found);
                 }
             }
@@ -214,7 +214,8 @@ impl<'m> Solver<'m> {
         self.equilibrium(from, to)
     }
 
-    /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`.
+    /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`. Where the
+    /// path turns back or comes to a saddle, the body is let go: see [`Snap`].
     ///
     /// # Errors
     /// [`Failure`] with the last equilibrium that was found on the path.
@@ -223,6 +224,7 @@ impl<'m> Solver<'m> {
         let (warp, limits) = self.walk(&start, to);
         let mut stepper = Stepper::new(limits);
         let mut history: Vec<Step> = Vec::new();
+        let mut snaps: Vec<Snap> = Vec::new();
         let mut last = from.clone();
         let mut before: Option<(f64, State)> = None;
         let mut modes = 0;
@@ -240,38 +242,73 @@ impl<'m> Solver<'m> {
             let outcome = match self.attempt(guess, &last, limits) {
                 Ok(outcome) => outcome,
                 Err(error) => {
-                    let reached = stepper.reached();
-                    return Err(Box::new(Failure { error, last_good: last.clone(), reached, failed: last }));
+                    let (reached, last_good) = (stepper.reached(), last.clone());
+                    return Err(Box::new(Failure { error, last_good, reached, failed: last, history }));
                 }
             };
+            let earlier = history.last().map_or(0.0, |step| step.place);
             match outcome.stop {
                 None if self.jumped(modes, stepper.length()) => {
                     self.balance.count_cut();
                     stepper.failed();
                 }
                 None => {
+                    let found = self.balance.negative_modes().unwrap_or(0);
+                    if found > modes
+                        && let Some(released) = self.release(&snaps, &outcome.state, &last)
+                    {
+                        stepper.resumed(place);
+                        snaps.push(released.snap(place, found, &last));
+                        history.push(released.step(place));
+                        (before, last) = (None, released.state);
+                        continue;
+                    }
+                    modes = modes.max(found);
                     stepper.succeeded(place, outcome.iterations.len());
-                    modes = modes.max(self.balance.negative_modes().unwrap_or(0));
-                    let earlier = history.last().map_or(0.0, |step| step.place);
-                    history.push(step(place, outcome.last, outcome.iterations));
+                    history.push(step(place, StepKind::Walked, outcome.last, outcome.iterations));
                     before = Some((earlier, std::mem::replace(&mut last, outcome.state)));
                 }
                 Some(stop) => {
                     self.balance.count_cut();
-                    if !stepper.failed() {
-                        let error = self.not_converged(&stepper, stop, &outcome);
-                        let reached = stepper.reached();
-                        return Err(Box::new(Failure { error, last_good: last, reached, failed: outcome.state }));
+                    if stepper.failed() {
+                        continue;
                     }
+                    let error = self.not_converged(&stepper, stop, &outcome);
+                    let beyond = (stepper.reached() + BEYOND_A_LIMIT).min(1.0);
+                    self.balance.set_target(between(&start, to, warp.place(beyond)));
+                    // where even longer steps were not allowed, a shorter one may lead on
+                    if stepper.length() < BEYOND_A_LIMIT
+                        && let Some(released) = self.release(&snaps, &last, &last)
+                    {
+                        stepper.resumed(beyond);
+                        snaps.push(released.snap(beyond, 0, &last));
+                        history.push(released.step(beyond));
+                        (before, last) = (None, released.state);
+                        continue;
+                    }
+                    history.push(step(place, StepKind::Failed, outcome.last, outcome.iterations));
+                    let reached = stepper.reached();
+                    return Err(Box::new(Failure {
+                        error,
+                        last_good: last,
+                        reached,
+                        failed: outcome.state,
+                        history,
+                    }));
                 }
             }
         }
         self.balance.set_target(to.clone());
-        self.close_gaps(last, history)
+        self.close_gaps(last, history, snaps)
     }
 
     /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.
-    fn close_gaps(&mut self, start: State, mut history: Vec<Step>) -> std::result::Result<Equilibrium, Box<Failure>> {
+    fn close_gaps(
+        &mut self,
+        start: State,
+        mut history: Vec<Step>,
+        snaps: Vec<Snap>,
+    ) -> std::result::Result<Equilibrium, Box<Failure>> {
         let mut state = start;
         let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
         for round in 0.. {
@@ -280,13 +317,13 @@ impl<'m> Solver<'m> {
             if gap <= tolerance {
                 break;
             }
-            let fail = |error: Error, failed: State, last_good: State| {
-                Err(Box::new(Failure { error, last_good, reached: 1.0, failed }))
+            let fail = |error: Error, failed: State, last_good: State, history: Vec<Step>| {
+                Err(Box::new(Failure { error, last_good, reached: 1.0, failed, history }))
             };
             if round == MULTIPLIER_ROUNDS {
                 let name = model.terms()[term].name().into();
                 let error = Error::GapNotClosed { name, gap, tolerance, rounds: round };
-                return fail(error, state.clone(), state);
+                return fail(error, state.clone(), state, history);
             }
             let next = State { multipliers, ..state.clone() };
             let limits_near = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
@@ -301,23 +338,24 @@ impl<'m> Solver<'m> {
             };
             match found {
                 Ok(Outcome { state: balanced, last, iterations, stop: None }) => {
-                    history.push(step(1.0, last, iterations));
+                    history.push(step(1.0, StepKind::Walked, last, iterations));
                     state = balanced;
                 }
                 Ok(outcome) => {
                     let error =
                         self.not_converged(&Stepper::at_end(), outcome.stop.unwrap_or(Stop::Iterations), &outcome);
-                    return fail(error, state, outcome.state);
+                    history.push(step(1.0, StepKind::Failed, outcome.last, outcome.iterations));
+                    return fail(error, outcome.state, state, history);
                 }
-                Err(error) => return fail(error, state.clone(), state),
+                Err(error) => return fail(error, state.clone(), state, history),
             }
         }
-        Ok(self.finish(state, history))
+        Ok(self.finish(state, history, snaps))
     }
 
-    fn finish(&mut self, state: State, history: Vec<Step>) -> Equilibrium {
+    fn finish(&mut self, state: State, history: Vec<Step>, snaps: Vec<Snap>) -> Equilibrium {
         let evaluation = self.balance.evaluation_at(&state);
-        Equilibrium { state, evaluation, history, negative_modes: self.balance.negative_modes() }
+        Equilibrium { state, evaluation, history, snaps, negative_modes: self.balance.negative_modes() }
     }
 
     /// Whether a step has landed on a saddle though the path so far was stable: another branch was met, and a shorter
@@ -358,19 +396,33 @@ impl<'m> Solver<'m> {
 
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
     fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
+        self.balance.off_surface = None;
         let guess = self.balance.at_target(guess);
-        let outcome = self.solve(guess, limits)?;
+        let mut outcome = self.solve(guess, limits)?;
         if outcome.stop == Some(Stop::Inadmissible) {
             let last = self.balance.at_target(last.clone());
-            return self.solve(last, limits);
+            outcome = self.solve(last, limits)?;
+        }
+        // Newton's method factorises the states before its solution; where there was one at most, that is a guess
+        let unseen = match outcome.iterations.len() {
+            0 => outcome.state.controls != last.controls,
+            1 => true,
+            _ => false,
+        };
+        if outcome.stop.is_none() && unseen {
+            self.balance.inspect(&outcome.state)?;
         }
         Ok(outcome)
     }
 
-    /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side.
+    /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side; the forces
+    /// of fibres have kinks too, but there only a body that is let go has no shorter step to get past them.
     fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
         let outcome = newton(&mut self.balance, start, limits)?;
-        if outcome.stop != Some(Stop::NoDescent) || self.balance.model.contacts().next().is_none() {
+        let model = self.balance.model;
+        let kinks =
+            model.contacts().next().is_some() || (self.balance.drag.is_some() && model.muscles().next().is_some());
+        if outcome.stop != Some(Stop::NoDescent) || !kinks {
             return Ok(outcome);
         }
         let mut iterations = outcome.iterations;
@@ -380,7 +432,10 @@ impl<'m> Solver<'m> {
     }
 
     fn not_converged(&self, stepper: &Stepper, stop: Stop, outcome: &Outcome<State>) -> Error {
+        let likely = self.likely(&outcome.state);
+        let off = matches!(likely, Some(Likely::OffSurface { .. }));
         let reason = match stop {
+            Stop::Inadmissible | Stop::NoDescent if off => "every step leads off a surface that a face must stay on",
             Stop::Inadmissible => "no admissible state to start from",
             Stop::NoDescent => "no step keeps det F positive and comes nearer",
             Stop::Iterations => "the iterations were used up",
@@ -396,7 +451,19 @@ impl<'m> Solver<'m> {
             det_f: min,
             residual: outcome.last.residual,
             required: outcome.last.required,
+            likely: likely.map(Box::new),
         }
+    }
+
+    /// What the trials of the last attempt, or else the state at which Newton's method gave up, show of the cause.
+    fn likely(&self, failed: &State) -> Option<Likely> {
+        let model = self.balance.model;
+        if let Some(off) = self.balance.off_surface {
+            let name = model.terms()[off.term].name().to_owned();
+            return Some(Likely::OffSurface { name, element: off.at.element, position: off.position });
+        }
+        let most = model.descending_fibres(failed).into_iter().max_by(|a, b| a.stretch.total_cmp(&b.stretch))?;
+        Some(most.told(model))
     }
 
     /// Solves K x = b with the tangent at the equilibrium `state` for several right-hand sides, one after the other in
@@ -419,8 +486,8 @@ impl<'m> Solver<'m> {
     }
 }
 
-fn step(place: f64, last: Assessment, iterations: Vec<Iteration>) -> Step {
-    Step { place, iterations, residual: last.residual, required: last.required }
+fn step(place: f64, kind: StepKind, last: Assessment, iterations: Vec<Iteration>) -> Step {
+    Step { place, kind, iterations, residual: last.residual, required: last.required }
 }
 
 /// Even steps along a path are even in ln(activation + onset) of the control that changes most:

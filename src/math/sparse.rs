@@ -195,6 +195,37 @@ impl SymmetricMatrix {
         first_of_column.iter().map(|&entry| self.values[entry]).collect()
     }
 
+    /// A += scale B on the entries that A has.
+    pub fn add_scaled(&mut self, scale: f64, b: &SymmetricMatrix) {
+        let pattern = &*self.pattern;
+        let (rows, start) = (pattern.row_idx(), pattern.col_ptr());
+        let (b_rows, b_start) = (b.pattern.row_idx(), b.pattern.col_ptr());
+        for column in 0..pattern.n() {
+            let mut entry = start[column];
+            for k in b_start[column]..b_start[column + 1] {
+                // rows ascend in both
+                while entry < start[column + 1] && rows[entry] < b_rows[k] {
+                    entry += 1;
+                }
+                if entry < start[column + 1] && rows[entry] == b_rows[k] {
+                    self.values[entry] += scale * b.values[k];
+                }
+            }
+        }
+    }
+
+    /// Sets all rows and columns to zero that are not `kept`.
+    pub fn keep(&mut self, kept: &[bool]) {
+        let pattern = &*self.pattern;
+        for column in 0..pattern.n() {
+            for entry in pattern.col_ptr()[column]..pattern.col_ptr()[column + 1] {
+                if !kept[column] || !kept[pattern.row_idx()[entry]] {
+                    self.values[entry] = 0.0;
+                }
+            }
+        }
+    }
+
     /// y = A x for one vector of length n. The same bits for any number of threads.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         self.multiply_columns(x, y, 1);

@@ -18,8 +18,10 @@ const ONSET: f64 = 10.0;
 /// about 1e-4 of a gap.
 const TIE_STIFFNESS: f64 = 1e4;
 
-/// The gap that a rigid tie may have, in sizes of an element: what the balance leaves open is less.
+/// The gap that a rigid tie may have, in sizes of an element, and in relation to the residual that the balance may have:
+/// what a residual leaves open is less.
 const TIE_TOLERANCE: f64 = 1e-9;
+const TIE_RESIDUAL: f64 = 1e-2;
 
 /// All bones of a scene; their controls are added to those that there are.
 pub(super) fn bones(scene: &Scene, controls: &mut Vec<Control>) -> Vec<Arc<Bone>> {
@@ -54,13 +56,14 @@ pub(super) fn bone(bones: &[Arc<Bone>], name: &Option<String>) -> Option<Arc<Bon
 }
 
 /// The terms of all attachments, each with its material point: springs and rigid ties, to space and to every bone.
-/// `element_size` is in mm, the shear modulus of the tissue in kPa.
+/// `element_size` is in mm, the shear modulus of the tissue in kPa; `residual` is the tolerance of the solver.
 pub(super) fn attachments(
     mesh: &Mesh,
     bones: &[Arc<Bone>],
     tied: &[(&AttachmentSpec, MaterialPoint)],
     element_size: f64,
     shear_modulus: f64,
+    residual: f64,
 ) -> Vec<Box<dyn Term>> {
     let mut terms: Vec<Box<dyn Term>> = Vec::new();
     for body in std::iter::once(None).chain(bones.iter().map(Some)) {
@@ -82,7 +85,8 @@ pub(super) fn attachments(
         let rigid: Vec<MaterialPoint> =
             own().filter(|(spec, _)| spec.tie == TieSpec::Rigid).map(|(_, at)| *at).collect();
         if !rigid.is_empty() {
-            let (stiffness, tolerance) = (TIE_STIFFNESS * shear_modulus * element_size, TIE_TOLERANCE * element_size);
+            let stiffness = TIE_STIFFNESS * shear_modulus * element_size;
+            let tolerance = TIE_TOLERANCE.max(TIE_RESIDUAL * residual) * element_size;
             terms.push(Box::new(RigidTies::new(mesh, &rigid, body.cloned(), stiffness, tolerance)));
         }
     }

@@ -6,7 +6,7 @@ use super::tissue::{Host, tissue};
 use super::{Control, Ingredients, Model};
 use crate::error::{Error, MuscleOutside, Place, Result, Warning};
 use crate::material::fibre::Blemker;
-use crate::math::tensor::{norm, normalised};
+use crate::math::tensor::{determinant, norm, normalised};
 use crate::mesh::block::block;
 use crate::mesh::element::{Element, TricubicHermite, Trilinear};
 use crate::mesh::exf::{ExFile, Geometry};
@@ -139,7 +139,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
         }
     }
     let element_size = (volume / mesh.elements() as f64).cbrt();
-    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus));
+    terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus, scene.solver.tolerance));
     let mut probes = Vec::new();
     for probe in &scene.probes {
         match locator.locate(probe.position_mm) {
@@ -317,8 +317,8 @@ fn embed(
     })
 }
 
-/// A reference shape that violates a contact by less is taken as rounding, mm.
-const START_TOLERANCE: f64 = 1e-6;
+/// A reference shape that violates a contact by less is taken as rounding, in element sizes.
+const START_TOLERANCE: f64 = 1e-7;
 
 fn contact(
     scene: &Scene,
@@ -342,7 +342,7 @@ fn contact(
     };
     let manner = Manner { law: contact_law(&spec.law), relax: spec.initial == InitialSpec::Relax, depth };
     let contact = Mutual::new(&spec.name, manner, mesh, between, spec.gauss);
-    let warning = start_of_contact(spec, allows, contact.worst_start(mesh))?;
+    let warning = start_of_contact(spec, allows, mesh, contact.worst_start(mesh))?;
     Ok((Box::new(contact), warning))
 }
 
@@ -386,7 +386,7 @@ fn rigid_contact(
     let relax = spec.initial == InitialSpec::Relax;
     let interface = Interface { allows, surface, law: contact_law(&spec.law), relax };
     let contact = Contact::new(&spec.name, interface, mesh, faces, spec.gauss);
-    let warning = start_of_contact(spec, allows, contact.worst_start(mesh))?;
+    let warning = start_of_contact(spec, allows, mesh, contact.worst_start(mesh))?;
     let contact = match bone {
         Some(bone) => contact.on(bone),
         None => contact,
@@ -398,13 +398,15 @@ fn rigid_contact(
 fn start_of_contact(
     spec: &ContactSpec,
     allows: Allows,
+    mesh: &Mesh,
     worst: Option<(MaterialPoint, [f64; 3], f64)>,
 ) -> Result<Option<Warning>> {
     let Some((at, position, gap)) = worst else { return Ok(None) };
+    let rounding = START_TOLERANCE * determinant(&mesh.jacobian(at)).abs().cbrt();
     let wrong = match allows {
-        Allows::Closed => gap.abs() > START_TOLERANCE,
+        Allows::Closed => gap.abs() > rounding,
         Allows::ClosedOrOpen if matches!(spec.law, ContactLawSpec::Barrier { .. }) => gap <= 0.0,
-        Allows::ClosedOrOpen => gap < -START_TOLERANCE,
+        Allows::ClosedOrOpen => gap < -rounding,
     };
     if !wrong {
         return Ok(None);

@@ -5,6 +5,7 @@ mod bones;
 pub mod build;
 mod constraints;
 mod numbering;
+mod signs;
 mod state;
 pub mod supports;
 mod tissue;
@@ -12,6 +13,7 @@ mod tissue;
 pub use assembly::{Evaluation, Tangent, Workspace, WorstPoint};
 pub use constraints::Renewal;
 pub use numbering::Numbering;
+pub use signs::{Descending, OffSurface};
 pub use state::State;
 
 use crate::error::Result;

@@ -71,6 +71,8 @@ pub struct MuscleState<'a> {
     pub min_stretch: f64,
     /// Largest stretch at a quadrature point.
     pub max_stretch: f64,
+    /// Quadrature points on the descending limb: see [`Model::descending_fibres`].
+    pub descending_points: usize,
     /// Energy, uJ.
     pub energy: f64,
 }
@@ -123,6 +125,7 @@ pub fn probe_states<'a>(probes: &'a [Probe], model: &Model, state: &State) -> Ve
 /// All muscles of a model at a state, in the order of its terms.
 pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluation) -> Vec<MuscleState<'m>> {
     let x = model.current(state);
+    let descending = model.descending_fibres(state);
     let muscle_state = |(term, muscle): (usize, &'m crate::term::muscle::Muscle)| {
         let (mut sum, mut min, mut max) = (0.0, f64::INFINITY, f64::NEG_INFINITY);
         for in_element in muscle.points().chunk_by(|a, b| a.host.element == b.host.element) {
@@ -140,6 +143,7 @@ pub fn muscle_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluatio
             mean_stretch: sum / muscle.volume(),
             min_stretch: min,
             max_stretch: max,
+            descending_points: descending.iter().find(|found| found.term == term).map_or(0, |found| found.points),
             energy: evaluation.energies[term],
         }
     };

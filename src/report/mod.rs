@@ -33,5 +33,5 @@ pub use frame::{
 pub use manifest::{Input, Manifest};
 pub use record::Record;
 pub use run_folder::RunFolder;
-pub use status::{FailedFrame, Outcome, Status};
+pub use status::{FailedFrame, FrameWarning, Outcome, Status};
 pub use view::View;

@@ -108,12 +108,13 @@ impl<'a> Record<'a> {
         Ok(())
     }
 
-    /// Writes the last equilibrium on the way to a frame that failed, and the iterate at which it failed; returns the paths
-    /// of the two files.
+    /// Writes the last equilibrium on the way to a frame that failed, the iterate at which it failed, and how Newton's method
+    /// came there; returns the paths of the two states.
     ///
     /// # Errors
     /// Where they cannot be written.
-    pub fn failed(&self, frame: Frame, failure: &Failure) -> Result<[PathBuf; 2]> {
+    pub fn failed(&mut self, frame: Frame, failure: &Failure) -> Result<[PathBuf; 2]> {
+        self.convergence.add(frame, &failure.history)?;
         let write = |name: &str, state: &State| self.view.write_beside(name, frame, self.model, state);
         Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }

@@ -1,7 +1,7 @@
 //! `status.json`: how a run stands or ended, for whoever asks while it goes on or afterwards.
 
 use super::run_folder::RunFolder;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use serde::{Deserialize, Serialize};
 
 /// How a run stands.
@@ -31,6 +31,24 @@ pub struct FailedFrame {
     pub message: String,
 }
 
+/// What the reader of a frame must know: it converged, and is perhaps not what was meant.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FrameWarning {
+    /// The frame, from 0.
+    pub frame: usize,
+    /// The stable code of the warning, for example `S007`.
+    pub code: String,
+    /// What was noticed, with its numbers.
+    pub message: String,
+}
+
+impl FrameWarning {
+    /// From the warning of a frame.
+    pub fn new(frame: usize, warning: &Warning) -> FrameWarning {
+        FrameWarning { frame, code: warning.code.into(), message: warning.message.clone() }
+    }
+}
+
 /// An error that belongs to no frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fatal {
@@ -51,6 +69,9 @@ pub struct Status {
     pub frames_ok: usize,
     /// Frames that did not, in their order.
     pub frames_failed: Vec<FailedFrame>,
+    /// What was noticed in frames, in their order.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub warnings: Vec<FrameWarning>,
     /// What ended the run, if it was not a frame.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub error: Option<Fatal>,
@@ -66,7 +87,7 @@ impl FailedFrame {
 impl Status {
     /// Of a run that goes on.
     pub fn running(frames_ok: usize, frames_failed: Vec<FailedFrame>) -> Status {
-        Status { status: Outcome::Running, exit: None, frames_ok, frames_failed, error: None }
+        Status { status: Outcome::Running, exit: None, frames_ok, frames_failed, warnings: Vec::new(), error: None }
     }
 
     /// Of a run that came to its end: exit 0 if no frame failed, else 4.

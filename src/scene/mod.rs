@@ -11,6 +11,7 @@ mod bones;
 mod contacts;
 mod cursor;
 mod curves;
+mod effects;
 mod interpret;
 mod lock;
 mod nearest;

@@ -49,7 +49,8 @@ pub struct Assessment {
 }
 
 impl Assessment {
-    fn converged(&self) -> bool {
+    /// Whether the state counts as a solution.
+    pub fn converged(&self) -> bool {
         self.admissible && !self.outstanding && self.residual <= self.required
     }
 }
@@ -75,6 +76,8 @@ pub enum Test {
     Slope,
 }
 
+/// A Newton step below this is rounding: where no such step makes the residual smaller, nothing will.
+const NEGLIGIBLE: f64 = 1e-10;
 /// Part of the slope that may remain.
 const SLOPE_LEFT: f64 = 0.5;
 /// Part of the step at which the search for it ends.
@@ -109,7 +112,7 @@ pub enum Stop {
 pub struct Outcome<S> {
     /// The last state: the solution if `stop` is `None`.
     pub state: S,
-    /// Residual at the last state.
+    /// Residual at the last state: not more than required, or so small that Newton's step from there is rounding.
     pub last: Assessment,
     /// Every iteration.
     pub iterations: Vec<Iteration>,
@@ -214,7 +217,10 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
                 }
             }
         }
-        let Some((trial, then, correction, _)) = accepted else { break Some(Stop::NoDescent) };
+        let Some((trial, then, correction, _)) = accepted else {
+            let solved = length <= NEGLIGIBLE && !now.outstanding;
+            break (!solved).then_some(Stop::NoDescent);
+        };
         let mut iteration = Iteration { residual: now.residual, required: now.required, factor, corrections: 0 };
         (state, now) = (trial, then);
         let mut correction = correction;

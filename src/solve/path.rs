@@ -61,6 +61,12 @@ impl Stepper {
         self.length = (taken * factor).min(self.limits.max);
     }
 
+    /// A solution at `place` was found in another way: the path goes on from there, carefully.
+    pub fn resumed(&mut self, place: f64) {
+        self.reached = place;
+        self.length = self.limits.first.min(self.limits.max).min(1.0);
+    }
+
     /// The step failed; `false` when no shorter step is allowed.
     pub fn failed(&mut self) -> bool {
         self.cuts += 1;

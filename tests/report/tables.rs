@@ -100,20 +100,22 @@ fn tables_have_their_columns_and_every_bit() {
     let muscles = muscle_states(&model, &found.state, e);
     MuscleTable::create(&run).and_then(|mut t| t.add(FRAME, &muscles)).expect("written");
     let rows = table("muscles");
-    let expected = "frame,time_s,name,activation,stretch_mean,stretch_min,stretch_max,energy_uj";
+    let expected = "frame,time_s,name,activation,stretch_mean,stretch_min,stretch_max,energy_uj,descending_points";
     assert_eq!(rows[0], columns(expected));
     assert_eq!((rows.len(), rows[2][2].as_str(), numbers(&rows[2][3..4])), (3, MUSCLES[1], vec![0.01]));
-    assert_eq!(numbers(&rows[2][7..]), [e.energies[2]]);
+    assert_eq!(numbers(&rows[2][7..8]), [e.energies[2]]);
+    assert_eq!(rows[2][8], "0");
 
     ConvergenceTable::create(&run).and_then(|mut t| t.add(FRAME, &found.history)).expect("written");
     let rows = table("convergence");
-    let expected = "frame,step,place,iteration,residual_mn,required_mn,damping,corrections";
+    let expected = "frame,step,place,kind,iteration,residual_mn,required_mn,damping,corrections";
     assert_eq!(rows[0], columns(expected));
     let iterations: usize = found.history.iter().map(|step| step.iterations.len()).sum();
     assert!(iterations > 1);
     assert_eq!(rows.len(), 1 + iterations + found.history.len());
-    let last = numbers(&rows[rows.len() - 1][..6]);
-    assert!(last[2] == 1.0 && last[4] <= last[5]);
+    let last = &rows[rows.len() - 1];
+    let residual = numbers(&last[5..7]);
+    assert!(last[2] == "1.0" && last[3] == "walked" && residual[0] <= residual[1], "{last:?}");
 
     write_cost(&run, &model, &work, 0.5).expect("written");
     let rows = table("cost");

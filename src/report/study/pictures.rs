@@ -19,6 +19,9 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(110, 110, 110),
 ];
 
+/// More variants than this are not all numbered.
+const MOST_NUMBERED: usize = 16;
+
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// Every picture with its file name; one that has nothing to show is left out.
@@ -54,9 +57,13 @@ fn error_time(study: &Study, outcome: &Outcome, text: &mut String) -> Drawn {
     let (Some(x), Some(y)) = (decades(pairs.iter().map(|p| p.1)), decades(pairs.iter().map(|p| p.0))) else {
         return Ok(());
     };
-    let area = SVGBackend::with_string(text, SIZE).into_drawing_area();
+    let on_front = front(&pairs);
+    let key = key(study, outcome, &on_front);
+    let height = SIZE.1 + 18 * key.len() as u32 + 10;
+    let area = SVGBackend::with_string(text, (SIZE.0, height)).into_drawing_area();
     area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&area)
+    let (upper, lower) = area.split_vertically(SIZE.1);
+    let mut chart = ChartBuilder::on(&upper)
         .caption(format!("{}: what accuracy costs", study.name), ("sans-serif", 22))
         .margin(14)
         .x_label_area_size(46)
@@ -73,7 +80,6 @@ fn error_time(study: &Study, outcome: &Outcome, text: &mut String) -> Drawn {
         .axis_desc_style(style)
         .light_line_style(RGBColor(235, 235, 235))
         .draw()?;
-    let on_front = front(&pairs);
     let line: Vec<(f64, f64)> = on_front.iter().map(|k| (pairs[*k].1, pairs[*k].0)).filter(|p| p.1 > 0.0).collect();
     chart.draw_series(LineSeries::new(line, COLOURS[1].stroke_width(2)))?;
     for (index, VariantResult { ending, .. }) in outcome.variants.iter().enumerate() {
@@ -86,48 +92,46 @@ fn error_time(study: &Study, outcome: &Outcome, text: &mut String) -> Drawn {
         let range = [(solved.timing.min(), error), (solved.timing.max(), error)];
         chart.draw_series(LineSeries::new(range, colour.mix(0.6)))?;
         chart.draw_series([Circle::new((seconds, error), 4, colour.filled())])?;
-        chart.draw_series([Text::new(
-            format!("  {}", index + 1),
-            (seconds, error),
-            ("sans-serif", 12).into_font().color(&BLACK.mix(if chosen { 1.0 } else { 0.6 })),
-        )])?;
+        // numbers of all only where there is room for them
+        if chosen || pairs.len() <= MOST_NUMBERED {
+            chart.draw_series([Text::new(
+                format!("  {}", index + 1),
+                (seconds, error),
+                ("sans-serif", 12).into_font().color(&BLACK.mix(if chosen { 1.0 } else { 0.6 })),
+            )])?;
+        }
     }
-    key(&area, study, outcome, &on_front)?;
+    for (row, (words, colour, failed)) in key.into_iter().enumerate() {
+        let y = 18 * row as i32;
+        if failed {
+            lower.draw(&Cross::new((76, y + 7), 4, RED.stroke_width(2)))?;
+        } else {
+            lower.draw(&Circle::new((76, y + 7), 4, colour.filled()))?;
+        }
+        lower.draw(&Text::new(clip(&words, 130), (90, y), ("sans-serif", 13).into_font().color(&colour)))?;
+    }
     area.present()?;
     Ok(())
 }
 
-/// The numbers of the points with their variants, below the upper right corner, as far as they have room; then those
-/// that failed.
-fn key<'a>(
-    area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
-    study: &Study,
-    outcome: &Outcome,
-    on_front: &[usize],
-) -> Drawn {
-    let mut row = 0;
-    let mut line = |words: String, colour: RGBColor, cross: bool| -> Drawn {
-        let (x, y) = (SIZE.0 as i32 - 380, 56 + 16 * row);
-        row += 1;
-        if cross {
-            area.draw(&Cross::new((x - 10, y + 6), 4, RED.stroke_width(2)))?;
-        }
-        area.draw(&Text::new(words, (x, y), ("sans-serif", 12).into_font().color(&colour)))?;
-        Ok(())
-    };
-    for k in on_front {
-        line(format!("{}  {}", k + 1, outcome.variants[*k].variant.name), COLOURS[1], false)?;
-    }
-    for (index, result) in outcome.variants.iter().enumerate() {
+/// What stands below the picture: the variants on the front with their numbers, all others where they are few, and those
+/// that failed; each with its colour and whether it failed.
+fn key(study: &Study, outcome: &Outcome, on_front: &[usize]) -> Vec<(String, RGBColor, bool)> {
+    let name = |k: usize| format!("{}   {}", k + 1, outcome.variants[k].variant.name);
+    let mut lines: Vec<_> = on_front.iter().map(|k| (name(*k), COLOURS[1], false)).collect();
+    let rest = (0..outcome.variants.len()).filter(|k| !on_front.contains(k));
+    for k in rest {
+        let result = &outcome.variants[k];
         match &result.ending {
-            Err(failed) => line(format!("{}  {}: {}", index + 1, result.variant.name, failed.code), RED, true)?,
+            Err(failed) => lines.push((format!("{}: {}", name(k), failed.code), RED, true)),
             Ok(_) if !result.pair(study.measure).0.is_finite() => {
-                line(format!("{}  {}: no error of this measure", index + 1, result.variant.name), COLOURS[6], false)?;
+                lines.push((format!("{}: no error of this measure", name(k)), COLOURS[6], false));
             }
+            Ok(_) if outcome.variants.len() <= MOST_NUMBERED => lines.push((name(k), COLOURS[0], false)),
             Ok(_) => {}
         }
     }
-    Ok(())
+    lines
 }
 
 /// Error against element size, both logarithmic, a line for each series of refinements.

@@ -10,12 +10,13 @@ use crate::report::run_folder::RunFolder;
 pub struct MuscleTable(Table);
 
 impl MuscleTable {
-    /// A new table. The mean of the fibre stretch is weighted by reference volume.
+    /// A new table. The mean of the fibre stretch is weighted by reference volume; `descending_points` counts the active
+    /// points that are stretched beyond 1.4 and lose force as they lengthen.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io), here and below.
     pub fn create(run: &RunFolder) -> Result<MuscleTable> {
-        let columns = "frame,time_s,name,activation,stretch_mean,stretch_min,stretch_max,energy_uj";
+        let columns = "frame,time_s,name,activation,stretch_mean,stretch_min,stretch_max,energy_uj,descending_points";
         Ok(MuscleTable(Table::create(&run.tables(), "muscles", columns.split(','))?))
     }
 
@@ -24,7 +25,8 @@ impl MuscleTable {
         let mut rows = Rows::default();
         for m in muscles {
             let numbers = [m.activation, m.mean_stretch, m.min_stretch, m.max_stretch, m.energy];
-            rows.add(of_frame(frame).into_iter().chain([m.name.into()]).chain(numbers.map(Into::into)));
+            let cells = of_frame(frame).into_iter().chain([m.name.into()]).chain(numbers.map(Into::into));
+            rows.add(cells.chain([m.descending_points.into()]));
         }
         self.0.append(rows)
     }

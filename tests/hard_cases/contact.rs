@@ -1,0 +1,65 @@
+//! Contact that opens and closes at very few points.
+
+use crate::record::{difference, drive, solver, stable};
+use risorius::model::build::build;
+use risorius::report::contact_states;
+use risorius::scene::Scene;
+use std::path::Path;
+
+/// A block whose lower face of two by two elements has nine points each to meet the tip of a small sphere; its upper face
+/// hangs on springs, so that only contact and springs bear the load.
+fn block_over_a_sphere(law: &str) -> Scene {
+    let text = format!(
+        r#"
+[task]
+kind = "forward"
+[mesh]
+block = {{ origin_mm = [0, 0, 0], size_mm = [10, 10, 5], elements = [2, 2, 1] }}
+[tissue]
+mooney-rivlin = {{ c1_kpa = 0.5, c2_kpa = 0.2 }}
+gauss = 4
+[[load]]
+spring = {{ face = "xi3=1", kpa_per_mm = 0.02 }}
+[[load]]
+traction = {{ face = "xi3=1", kpa = [0, 0, -0.05] }}
+[[contact]]
+face = "xi3=0"
+surface = {{ sphere = {{ centre_mm = [5.3, 4.6, -3.05], radius_mm = 3, inside = false }} }}
+law = {{ {law} }}
+gauss = 3
+"#
+    );
+    Scene::parse(&text, "chatter.toml", Path::new("."), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn contact_at_few_points_opens_and_closes_without_chatter() {
+    for (law, allowed) in [
+        ("penalty = { kpa_per_mm = 20 }", 0.2),
+        ("augmented = { kpa_per_mm = 20, gap_mm = 1e-4 }", 1e-4),
+        ("barrier = { kpa_per_mm = 20, range_mm = 0.04 }", 0.0),
+    ] {
+        let name = law.split(' ').next().unwrap_or_default();
+        let model = build(&block_over_a_sphere(law)).unwrap_or_else(|error| panic!("{error}")).model;
+        let mut solver = solver(&model);
+        let mut state = model.rest();
+        let mut first: Option<risorius::model::State> = None;
+        for round in 0..5 {
+            let pressed = stable(&format!("{name}: pressed, round {round}"), &mut solver, &state, &drive(&[], 1.0));
+            let contact = contact_states(&model, &pressed.state)[0];
+            assert!(contact.area > 0.0 && contact.force[2] > 0.0, "{name}: {contact:?}");
+            assert!(contact.penetration <= allowed, "{name}: {} mm deep", contact.penetration);
+            if let Some(first) = &first {
+                let drift = difference(first, &pressed.state);
+                // multipliers come as close as their tolerance of 1e-4 mm
+                assert!(drift < if name == "augmented" { 1e-3 } else { 1e-6 }, "{name}: drifted by {drift:.1e}");
+            }
+            first.get_or_insert(pressed.state.clone());
+            let lifted =
+                stable(&format!("{name}: lifted, round {round}"), &mut solver, &pressed.state, &drive(&[], -1.0));
+            let contact = contact_states(&model, &lifted.state)[0];
+            assert_eq!((contact.area, contact.max_pressure), (0.0, 0.0), "{name}: {contact:?}");
+            state = lifted.state;
+        }
+    }
+}
