@@ -45,7 +45,7 @@ blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0, p2
 "#;
 const ACTIVATION: f64 = 0.01;
 
-const EFFECTS: [Effect; 14] = [
+const EFFECTS: [Effect; 15] = [
     Effect { name: "muscle", terms: &["slab"], idle: MUSCLE, at_work: MUSCLE },
     Effect {
         name: "region",
@@ -117,6 +117,12 @@ const EFFECTS: [Effect; 14] = [
         name: "contact with itself",
         terms: &["contact-1"],
         idle: "[[contact]]\nface = \"xi3=0\"\nsurface = { itself = {} }\nlaw = { penalty = { kpa_per_mm = 5 } }",
+        at_work: "",
+    },
+    Effect {
+        name: "bone",
+        terms: &[],
+        idle: "[[bone]]\nname = \"jaw\"\nslide = { direction = [1, 0, 0], bounds_mm = [0, 12] }",
         at_work: "",
     },
     Effect {

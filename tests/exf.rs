@@ -111,6 +111,19 @@ fn version_3_has_sums_zeros_products_of_scale_factors_and_collapsed_edges() {
 }
 
 #[test]
+fn faces_and_their_mesh_are_passed_over() {
+    let faces = "!#mesh mesh2d, dimension=2, nodeset=nodes\nDefine element template: face\nShape. Dimension=2, line*line\n\
+                 #Scale factor sets=0\n#Nodes=0\n#Fields=0\nElement template: face\nElement: 1\nElement: 2\n\
+                 !#mesh mesh3d, dimension=3, face mesh=mesh2d, nodeset=nodes";
+    let text = VERSION_3.replacen("!#mesh mesh3d, dimension=3, nodeset=nodes", faces, 1);
+    let with_faces = text.replacen(" Nodes:", " Faces:\n 1 2 -1 2 1 -1\n Nodes:", 1);
+    assert!(text.len() > VERSION_3.len() && with_faces.len() > text.len());
+    let (read, plain) = (geometry(&with_faces), geometry(VERSION_3));
+    assert_eq!((read.elements, &read.mesh.corners), (plain.elements, &plain.mesh.corners));
+    assert_eq!(bits(&read.mesh, &read.mesh.parameters), bits(&plain.mesh, &plain.mesh.parameters));
+}
+
+#[test]
 fn lagrange_bases_are_the_same_polynomials() {
     let read = geometry(LAGRANGE);
     assert_eq!((read.field.as_str(), read.mesh.nodes, read.mesh.parameters.len()), ("lattice", 8, 24));

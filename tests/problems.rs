@@ -1,6 +1,6 @@
 //! Every folder of `problems/` does what its `expected.toml` says: discovered, not listed.
 //!
-//! `expected.toml`: the `status` of the run, and values: the table, the cells that choose a row, the column, the value and an
+//! `expected.toml`: the `status` of the run, `arguments` that make a long one short, and values: the table, the cells that choose a row, the column, the value and an
 //! absolute tolerance in the units of the column.
 
 use serde::Deserialize;
@@ -10,6 +10,8 @@ use std::path::Path;
 #[derive(Deserialize)]
 struct Expected {
     status: String,
+    #[serde(default)]
+    arguments: Vec<String>,
     #[serde(default)]
     value: Vec<Value>,
 }
@@ -53,6 +55,7 @@ fn check(folder: &Path) {
         .arg(folder.join("problem.toml"))
         .arg("--out")
         .arg(&run)
+        .args(&expected.arguments)
         .output()
         .expect("it runs");
     let errors = String::from_utf8_lossy(&output.stderr);

@@ -4,10 +4,10 @@ use super::progress::Meter;
 use super::run::{Tally, begin, finish};
 use super::terminal::print;
 use super::{Ending, Flags};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::forward::Work;
 use crate::report;
-use crate::scene::Study;
+use crate::scene::{ReferenceSpec, Study};
 use crate::study::{Prepared, Sweep, variants};
 use std::path::Path;
 
@@ -35,9 +35,18 @@ pub(super) fn run(study: &Study, path: &Path, flags: &Flags) -> Result<Ending> {
     finish(&run, None, &work, tally, flags.strict)
 }
 
-/// Every variant with its size and cost, or what is wrong with it.
+/// Every variant with its size and cost.
+///
+/// # Errors
+/// What is wrong with the reference and with the variants, all at once.
 pub(super) fn check(study: &Study) -> Result<Ending> {
     let all = variants(study);
+    let mut mistakes = Vec::new();
+    if let ReferenceSpec::Variant(change) = &study.reference
+        && let Err(error) = Prepared::read(&study.problem, change)
+    {
+        mistakes.extend(error.into_mistakes());
+    }
     let mut page = format!(
         "{}: study of {}; {} variants, each solved once and then timed {} times\n",
         study.name,
@@ -57,8 +66,14 @@ pub(super) fn check(study: &Study) -> Result<Ending> {
                     model.factor_flops() / 1e6
                 )
             }
-            Err(error) => format!("  {}: {} {error}\n", variant.name, error.code()),
+            Err(error) => {
+                mistakes.extend(error.into_mistakes());
+                format!("  {}: a mistake\n", variant.name)
+            }
         };
+    }
+    if !mistakes.is_empty() {
+        return Err(Error::all(mistakes));
     }
     print(&page)?;
     Ok(Ending::Ok)

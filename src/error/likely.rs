@@ -12,7 +12,7 @@ pub enum Likely {
         /// Where its face leaves the surface, mm.
         position: [f64; 3],
     },
-    /// Active fibres lose force as they lengthen: one part of a muscle stretches the other.
+    /// Active fibres are so long that they have lost force: one part of a muscle stretches the other.
     DescendingLimb {
         /// The muscle.
         muscle: String,
@@ -37,8 +37,8 @@ impl std::fmt::Display for Likely {
             ),
             Likely::DescendingLimb { muscle, points, of, position: [x, y, z], stretch } => write!(
                 out,
-                "{points} of {of} fibre points of muscle `{muscle}` are on the descending limb, where force falls with \
-                 stretch: the longest, at ({x:.2}, {y:.2}, {z:.2}) mm, has a stretch of {stretch:.3}"
+                "{points} of {of} fibre points of muscle `{muscle}` are active beyond a stretch of 1.4, on the descending limb \
+                 of their force: the longest, at ({x:.2}, {y:.2}, {z:.2}) mm, has a stretch of {stretch:.3}"
             ),
         }
     }

@@ -1,7 +1,7 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
 use super::placement::Marker;
-use super::sensitivity::{Sensitivity, sensitivities};
+use super::sensitivity::{Reuse, Sensitivity, sensitivities};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Solver};
 use argmin::core::{Jacobian, Operator};
@@ -26,6 +26,7 @@ pub struct FrameProblem<'f, 'm> {
     measured: Vec<Measured>,
     unknowns: &'f [usize],
     sensitivity: Sensitivity,
+    reuse: Reuse,
     drive: Drive,
     inner: RefCell<Inner<'f, 'm>>,
 }
@@ -35,29 +36,59 @@ struct Inner<'f, 'm> {
     /// The equilibrium from which the next one is sought.
     base: Equilibrium,
     /// dx/dq at `base`, once it is known.
-    directions: Option<Vec<Vec<f64>>>,
+    directions: Option<Directions>,
     /// The equilibrium last found, if it is another one.
     trial: Option<Equilibrium>,
 }
 
+/// dx/dq for the unknowns, one direction each.
+#[derive(Debug, Clone)]
+pub struct Directions {
+    columns: Vec<Vec<f64>>,
+    /// Whether they were found at the equilibrium where they are used, and not kept from another.
+    fresh: bool,
+}
+
+impl Directions {
+    /// D + (dx - D dq) dq^T / |dq|^2 for the step dq from one equilibrium to another; dq in parts of each control's range.
+    fn learn(&mut self, dx: &[f64], dq: &[f64], ranges: &[f64]) {
+        let parts: Vec<f64> = dq.iter().zip(ranges).map(|(d, r)| d / r).collect();
+        let square: f64 = parts.iter().map(|d| d * d).sum();
+        if square == 0.0 {
+            return;
+        }
+        let mut missed = dx.to_vec();
+        for (column, by) in self.columns.iter().zip(dq) {
+            missed.iter_mut().zip(column).for_each(|(m, d)| *m -= by * d);
+        }
+        for ((column, part), range) in self.columns.iter_mut().zip(&parts).zip(ranges) {
+            column.iter_mut().zip(&missed).for_each(|(d, m)| *d += m * part / (square * range));
+        }
+    }
+}
+
 impl<'f, 'm> FrameProblem<'f, 'm> {
-    /// A frame that starts from an equilibrium.
+    /// A frame that starts from an equilibrium, with its sensitivities if they are known.
+    #[allow(clippy::too_many_arguments)] // what a frame is made of
     pub fn new(
         solver: &'f mut Solver<'m>,
         markers: &'f [Marker],
         measured: Vec<Measured>,
         unknowns: &'f [usize],
-        sensitivity: Sensitivity,
+        (sensitivity, reuse): (Sensitivity, Reuse),
         drive: Drive,
         start: Equilibrium,
+        directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
-        let inner = RefCell::new(Inner { solver, base: start, directions: None, trial: None });
-        FrameProblem { markers, measured, unknowns, sensitivity, drive, inner }
+        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None });
+        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, inner }
     }
 
-    /// The equilibrium at which the derivative was last taken: the last one that the iteration accepted.
-    pub fn into_equilibrium(self) -> Equilibrium {
-        self.inner.into_inner().base
+    /// The equilibrium at which the derivative was last asked for, the last one that the iteration accepted, and the
+    /// sensitivities there.
+    pub fn into_equilibrium(self) -> (Equilibrium, Option<Directions>) {
+        let inner = self.inner.into_inner();
+        (inner.base, inner.directions)
     }
 
     /// The controls of the model for values of the unknowns.
@@ -92,7 +123,7 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             // to first order the body moves along the sensitivities
             Some(directions) => {
                 let mut guess = inner.base.state.clone();
-                for (control, direction) in self.unknowns.iter().zip(directions) {
+                for (control, direction) in self.unknowns.iter().zip(&directions.columns) {
                     let by = drive.controls[*control] - inner.base.state.controls[*control];
                     inner.solver.model().advance(&mut guess, direction, by);
                 }
@@ -105,6 +136,31 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         Ok(residuals)
     }
 
+    /// What is kept of the sensitivities at the base when the iteration goes on to `next`.
+    fn carry(&self, inner: &mut Inner<'_, '_>, next: &Equilibrium) {
+        let Some(mut known) = inner.directions.take() else { return };
+        let model = inner.solver.model();
+        match self.reuse {
+            Reuse::Fresh => return,
+            Reuse::Frozen => {}
+            Reuse::Broyden => {
+                let (before, after) = (model.unknowns(&inner.base.state), model.unknowns(&next.state));
+                let dx: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
+                let change = |k: &usize| next.state.controls[*k] - inner.base.state.controls[*k];
+                let range = |k: &usize| model.controls()[*k].upper - model.controls()[*k].lower;
+                let dq: Vec<f64> = self.unknowns.iter().map(change).collect();
+                known.learn(&dx, &dq, &self.unknowns.iter().map(range).collect::<Vec<f64>>());
+            }
+        }
+        known.fresh = false;
+        inner.directions = Some(known);
+    }
+
+    /// Forgets sensitivities that were kept, so that the next derivative is taken anew.
+    fn forget_stale(&self) {
+        self.inner.borrow_mut().directions.take_if(|known| !known.fresh);
+    }
+
     fn jacobian_at(&self, q: &[f64]) -> Result<DMatrix<f64>> {
         let drive = self.drive(q);
         let matches = |at: &Equilibrium| at.state.controls == drive.controls;
@@ -113,12 +169,19 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         }
         let inner = &mut *self.inner.borrow_mut();
         if let Some(trial) = inner.trial.take_if(|trial| matches(trial)) {
+            self.carry(inner, &trial);
             inner.base = trial;
         }
-        let directions = sensitivities(self.sensitivity, inner.solver, &inner.base, self.unknowns)?;
+        let directions = match inner.directions.take() {
+            Some(known) => known,
+            None => Directions {
+                columns: sensitivities(self.sensitivity, inner.solver, &inner.base, self.unknowns)?,
+                fresh: true,
+            },
+        };
         let model = inner.solver.model();
         let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
-        for (column, (control, direction)) in self.unknowns.iter().zip(&directions).enumerate() {
+        for (column, (control, direction)) in self.unknowns.iter().zip(&directions.columns).enumerate() {
             let du = model.displacement_rate(&inner.base.state, *control, direction);
             for (row, m) in self.measured.iter().enumerate() {
                 let change = model.mesh().interpolate(self.markers[m.marker].point, &du);
@@ -145,7 +208,11 @@ impl Jacobian for FrameProblem<'_, '_> {
     type Param = Vec<f64>;
     type Jacobian = DMatrix<f64>;
 
+    /// After a step: with what is kept. Asked again where it was asked before: anew.
     fn jacobian(&self, q: &Vec<f64>) -> std::result::Result<DMatrix<f64>, argmin::core::Error> {
+        if self.drive(q).controls == self.inner.borrow().base.state.controls {
+            self.forget_stale();
+        }
         self.jacobian_at(q).map_err(Error::into)
     }
 }

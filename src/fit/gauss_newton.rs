@@ -47,6 +47,10 @@ pub struct GaussNewton {
     trust: f64,
     /// Largest change of a control in the last step, as a part of its range.
     step: f64,
+    /// Whether the problem keeps Jacobians from step to step.
+    keeps: bool,
+    /// Whether the Jacobian at hand was taken where it is used.
+    fresh: bool,
 }
 
 /// First trust region: a factor e^2 in (activation + onset).
@@ -55,13 +59,21 @@ const FIRST_TRUST: f64 = 2.0;
 const SUFFICIENT: f64 = 1e-4;
 /// The trust region is not shrunk below this.
 const SMALLEST_TRUST: f64 = 1e-10;
+/// Rejected steps after which a Jacobian that was kept is taken anew, and the least trust region then.
+const REJECTED_WITH_KEPT: u64 = 2;
+const KEPT_TRUST: f64 = 0.1;
 /// Part of the largest curvature that holds controls still which no marker sees.
 const STILL: f64 = 1e-11;
 
 impl GaussNewton {
     /// For controls with the given ranges.
     pub fn new(ranges: Vec<Range>, tolerance: f64) -> GaussNewton {
-        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, step: f64::INFINITY }
+        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, step: f64::INFINITY, keeps: false, fresh: true }
+    }
+
+    /// For a problem whose Jacobian after a step may be one that it kept; asked again at the same place it is taken anew.
+    pub fn with_kept_jacobians(self) -> GaussNewton {
+        GaussNewton { keeps: true, ..self }
     }
 }
 
@@ -120,6 +132,15 @@ where
             let d = DVector::from_vec(d);
             let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));
             let last = self.step <= self.tolerance;
+            if !self.fresh && (last || rejected == REJECTED_WITH_KEPT) {
+                // neither rest nor failure is believed before the derivative was taken here
+                let jacobian = jacobian(problem, &q)?;
+                (self.fresh, self.step, self.trust) = (true, f64::INFINITY, self.trust.max(KEPT_TRUST));
+                let gradient = jacobian.tr_mul(&DVector::from_column_slice(&r)).as_slice().to_vec();
+                let report = kv!("step" => 0.0; "trust" => self.trust; "rejected" => rejected;);
+                let state = state.param(q).residuals(r).jacobian(jacobian).gradient(gradient).cost(before);
+                return Ok((state, Some(report)));
+            }
 
             let outcome = residuals(problem, &trial);
             let after = match &outcome {
@@ -141,6 +162,7 @@ where
                 }
                 let residuals = outcome?;
                 let jacobian = jacobian(problem, &trial)?;
+                self.fresh = !self.keeps;
                 let gradient = jacobian.tr_mul(&DVector::from_column_slice(&residuals)).as_slice().to_vec();
                 let report = kv!("step" => self.step; "trust" => self.trust; "rejected" => rejected;);
                 let state = state.param(trial).residuals(residuals).jacobian(jacobian).gradient(gradient).cost(after);
@@ -180,7 +202,10 @@ where
 }
 
 fn is_not_converged(error: &ArgminError) -> bool {
-    matches!(error.downcast_ref::<Error>(), Some(Error::NotConverged { .. } | Error::Singular { .. }))
+    matches!(
+        error.downcast_ref::<Error>(),
+        Some(Error::NotConverged { .. } | Error::GapNotClosed { .. } | Error::Singular { .. })
+    )
 }
 
 /// 1/2 |r|^2

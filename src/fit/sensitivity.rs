@@ -17,6 +17,18 @@ pub enum Sensitivity {
     },
 }
 
+/// What becomes of sensitivities after a step of a fit. The step that ends a fit is always made with fresh ones: with stale
+/// ones the iteration would come to rest where the residuals are not stationary.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reuse {
+    /// They are found anew after every step.
+    Fresh,
+    /// They are kept until no step is made with them.
+    Frozen,
+    /// They are kept but for what the step shows: D + (dx - D dq) dq^T / |dq|^2 (Broyden 1965).
+    Broyden,
+}
+
 /// How much tighter than a fit's own equilibria those of finite differences are solved.
 const TIGHTER: f64 = 1e-4;
 
@@ -34,7 +46,9 @@ pub fn sensitivities(
         Sensitivity::Tangent => solver.rates(&at.state, unknowns),
         Sensitivity::FiniteDifference { step } => {
             let settings = solver.settings();
-            solver.set_settings(Settings { tolerance: TIGHTER * settings.tolerance, ..settings });
+            // a neighbour must be one: on the same branch, stable or not
+            let tolerance = TIGHTER * settings.tolerance;
+            solver.set_settings(Settings { tolerance, release: false, ..settings });
             let found = unknowns.iter().map(|control| difference(solver, at, *control, step)).collect();
             solver.set_settings(settings);
             found

@@ -1,16 +1,16 @@
 //! A clip, frame after frame: each fit starts where the last one ended.
 
 use super::covariance::{Bound, standard_deviations};
-use super::frame::{FrameProblem, Measured};
+use super::frame::{Directions, FrameProblem, Measured};
 use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
 use super::placement::{Marker, check_units, place};
-use super::sensitivity::Sensitivity;
+use super::sensitivity::{Reuse, Sensitivity};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
 use crate::model::{Control, Model};
-use crate::scene::{ControlValue, Curves, FitSpec, Scene, SensitivitySpec};
+use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
@@ -27,12 +27,14 @@ pub struct Fit<'m> {
     /// Controls that follow a table over the time of the recording.
     held_curves: Vec<HeldCurve>,
     sensitivity: Sensitivity,
+    reuse: Reuse,
     tolerance: f64,
     max_iterations: usize,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
     known_sd: bool,
-    /// The equilibrium of the last frame.
+    /// The equilibrium of the last frame, and the sensitivities there.
     last: Equilibrium,
+    directions: Option<Directions>,
 }
 
 /// One iteration of a frame's fit.
@@ -118,9 +120,15 @@ impl<'m> Fit<'m> {
             held,
             held_curves,
             sensitivity,
+            reuse: match fit.reuse {
+                ReuseSpec::Fresh => Reuse::Fresh,
+                ReuseSpec::Frozen => Reuse::Frozen,
+                ReuseSpec::Broyden => Reuse::Broyden,
+            },
             tolerance: fit.tolerance,
             max_iterations: fit.max_iterations,
             last,
+            directions: None,
         })
     }
 
@@ -158,7 +166,7 @@ impl<'m> Fit<'m> {
         let residuals = 3 * measured.len();
         let optimum = self.optimise(frame, shown.time_s, measured)?;
         let (bounds, sd) = self.uncertainty(&optimum, residuals);
-        self.last = optimum.equilibrium;
+        (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
         let x = model.current(&self.last.state);
@@ -197,12 +205,15 @@ impl<'m> Fit<'m> {
             &self.markers,
             measured,
             &self.unknowns,
-            self.sensitivity,
+            (self.sensitivity, self.reuse),
             Drive { controls: held, load: 1.0 },
             self.last.clone(),
+            self.directions.clone(),
         );
         let most = self.max_iterations as u64;
-        let mut result = Executor::new(problem, GaussNewton::new(ranges, self.tolerance))
+        let solver = GaussNewton::new(ranges, self.tolerance);
+        let solver = if self.reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
+        let mut result = Executor::new(problem, solver)
             .configure(|state: GaussNewtonState| state.param(start).max_iters(most))
             .add_observer(log.clone(), ObserverMode::Always)
             .timer(false)
@@ -218,12 +229,11 @@ impl<'m> Fit<'m> {
             TerminationStatus::Terminated(_) | TerminationStatus::NotTerminated => Some("it was ended from outside"),
         };
         match (reason, result.problem.take_problem(), result.state.take_jacobian()) {
-            (None, Some(problem), Some(jacobian)) => Ok(Optimum {
-                equilibrium: problem.into_equilibrium(),
-                jacobian,
-                cost: result.state.get_cost(),
-                iterations,
-            }),
+            (None, Some(problem), Some(jacobian)) => {
+                let (equilibrium, directions) = problem.into_equilibrium();
+                let cost = result.state.get_cost();
+                Ok(Optimum { equilibrium, directions, jacobian, cost, iterations })
+            }
             (reason, ..) => Err(Error::FitNotConverged {
                 frame,
                 iterations: iterations.len(),
@@ -262,6 +272,7 @@ impl<'m> Fit<'m> {
 /// Where the iteration of a frame ended.
 struct Optimum {
     equilibrium: Equilibrium,
+    directions: Option<Directions>,
     /// d(weighted residual)/d(unknown control).
     jacobian: DMatrix<f64>,
     /// 1/2 sum of squared weighted residuals.

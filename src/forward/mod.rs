@@ -478,7 +478,7 @@ impl<'m> Solver<'m> {
 
     /// The state after one Newton step from `state`, in which all prescribed motion is done: what a state that is near an
     /// equilibrium lacks, to first order. Where the step does not lower the residual, `state` is not near, and the
-    /// equilibrium is sought from there with damped steps.
+    /// equilibrium is sought from there, with damped steps and if need be by letting the body go.
     ///
     /// # Errors
     /// As [`Solver::solve_with_tangent`]; no equilibrium.
@@ -487,13 +487,16 @@ impl<'m> Solver<'m> {
             return Ok(corrected);
         }
         self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });
-        let limits =
-            Limits { iterations: self.settings.max_iterations, damping: DAMPING / 10.0, test: Test::Monotone };
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
         let outcome = self.solve(state.clone(), limits)?;
-        match outcome.stop {
-            None => Ok(outcome.state),
-            Some(stop) => Err(self.not_converged(&Stepper::at_end(), stop, &outcome)),
-        }
+        let found = match outcome.stop {
+            None => outcome.state,
+            Some(stop) => match self.release(&[], state, state) {
+                Some(released) => released.state,
+                None => return Err(self.not_converged(&Stepper::at_end(), stop, &outcome)),
+            },
+        };
+        Ok(self.close_gaps(found, Vec::new(), Vec::new())?.state)
     }
 
     /// d(unknowns)/d(control) at the equilibrium `state` by the implicit function theorem, for each of `controls`.

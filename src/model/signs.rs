@@ -7,7 +7,7 @@ use crate::math::tensor::norm;
 use crate::mesh::MaterialPoint;
 use crate::term::contact::law::Allows;
 
-/// Normalised stretch from which on a fibre counts as on the descending limb: where f_act turns flat towards its end.
+/// Normalised stretch beyond which an active fibre counts as on the descending limb; f_act ends at 1.6.
 const DESCENDING: f64 = 1.4;
 
 /// A point of a face that has left the surface it must stay on.
@@ -21,12 +21,13 @@ pub struct OffSurface {
     pub position: [f64; 3],
 }
 
-/// Fibres of one muscle that are active and lose force as they lengthen.
+/// Fibres of one muscle that are active and have been stretched to where they lose force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Descending {
     /// The muscle, as an index in [`Model::terms`].
     pub term: usize,
-    /// Its quadrature points with a normalised stretch beyond 1.4, a positive activation, and dT/dlambda < 0.
+    /// Its quadrature points beyond a normalised stretch of 1.4 that are so active that dT/dlambda < 0 just beyond it: what
+    /// the passive force gains there is less than what the active one loses.
     pub points: usize,
     /// All its points.
     pub of: usize,
@@ -66,9 +67,8 @@ impl Model {
                 for point in in_element {
                     let (stretch, activation) =
                         (norm(point.deformed_fibre(&local)), point.activation(&state.controls));
-                    let falls = stretch > DESCENDING * law.lambda_ofl
-                        && activation > 0.0
-                        && law.tension(stretch, activation).slope < 0.0;
+                    let limb = DESCENDING * law.lambda_ofl;
+                    let falls = stretch > limb && law.tension(limb, activation).slope < 0.0;
                     if !falls {
                         continue;
                     }

@@ -3,9 +3,11 @@
 use super::{ContactSpec, LoadKind, Scene, SupportKind, SurfaceSpec};
 
 /// The effects beside the passive tissue, in the order of the README.
-const EFFECTS: [&str; 18] = [
+const EFFECTS: [&str; 19] = [
     "region",
     "muscle",
+    "activation field",
+    "bone",
     "clamp",
     "symmetry",
     "plate",
@@ -21,14 +23,34 @@ const EFFECTS: [&str; 18] = [
     "contact with a rigid surface",
     "contact with other faces",
     "contact with itself",
-    "activation field",
 ];
 
 impl Scene {
     /// Every effect with the number of tables that name it; none is an effect that is absent.
     pub fn effects(&self) -> Vec<(&'static str, usize)> {
         // a new kind of table must be sorted in here before this compiles
-        let Scene { regions, muscles, supports, slidings, contacts, loads, attachments, .. } = self;
+        let Scene {
+            regions,
+            muscles,
+            bones,
+            supports,
+            slidings,
+            contacts,
+            loads,
+            attachments,
+            name: _,
+            folder: _,
+            task: _,
+            mesh: _,
+            tissue: _,
+            controls: _,
+            probes: _,
+            fit: _,
+            markers: _,
+            solver: _,
+            output: _,
+            warnings: _,
+        } = self;
         let many = |word: &'static str, count: usize| std::iter::repeat_n(word, count);
         let supports = supports.iter().map(|support| match support.kind {
             SupportKind::Clamp { .. } => "clamp",
@@ -60,6 +82,7 @@ impl Scene {
             .chain(many("region", regions.len()))
             .chain(many("muscle", muscles.len()))
             .chain(many("activation field", fields))
+            .chain(many("bone", bones.len()))
             .chain(many("sliding", slidings.len()))
             .chain(many("attachment", attachments.len()))
             .collect();

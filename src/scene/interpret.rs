@@ -475,6 +475,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let sensitivities =
         [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
     let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
+    let reuses = [("fresh", ReuseSpec::Fresh), ("frozen", ReuseSpec::Frozen), ("broyden", ReuseSpec::Broyden)];
+    let reuse = table.or("reuse", ReuseSpec::Fresh, |item| item.choice(&reuses, &[]));
     let unknowns = match references.muscles() {
         // which of the bones are sought must be said
         none if none.is_empty() && references.has_bones() => {
@@ -497,6 +499,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         units: units?,
         topic: topic?,
         sensitivity: sensitivity?,
+        reuse: reuse?,
         unknowns: unknowns?,
         zero_is_missing: zero_is_missing?,
         allow_truncated: allow_truncated?,

@@ -367,6 +367,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         units,
         topic,
         sensitivity,
+        reuse,
         unknowns,
         zero_is_missing,
         allow_truncated,
@@ -386,12 +387,18 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         SensitivitySpec::Tangent => "tangent",
         SensitivitySpec::FiniteDifference => "finite-difference",
     };
+    let reuse = match reuse {
+        ReuseSpec::Fresh => "fresh",
+        ReuseSpec::Frozen => "frozen",
+        ReuseSpec::Broyden => "broyden",
+    };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
     let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
     lines.extend(["\n[fit]".into(), format!("markers = {}", path(markers)), format!("units = \"{units}\"")]);
     lines.extend(topic.as_ref().map(|topic| format!("topic = {}", text(topic))));
     lines.extend([
         format!("sensitivity = \"{sensitivity}\""),
+        format!("reuse = \"{reuse}\""),
         format!("unknowns = [{unknowns}]"),
         format!("zero_is_missing = {zero_is_missing}"),
         format!("allow_truncated = {allow_truncated}"),

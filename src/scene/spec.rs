@@ -717,6 +717,8 @@ pub struct FitSpec {
     pub topic: Option<String>,
     /// How the derivative of marker positions by activations is found.
     pub sensitivity: SensitivitySpec,
+    /// What becomes of it after a step.
+    pub reuse: ReuseSpec,
     /// The controls that are sought: muscles, `<bone>.hinge`, `<bone>.slide`; by default all muscles and no bone.
     pub unknowns: Vec<String>,
     /// Whether a sample at exactly (0, 0, 0) is a lost marker.
@@ -760,6 +762,18 @@ pub enum SensitivitySpec {
     Tangent,
     /// From whole solves at activations a little apart.
     FiniteDifference,
+}
+
+/// What becomes of sensitivities after a step of a fit: `[fit] reuse`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReuseSpec {
+    /// They are found anew.
+    Fresh,
+    /// They are kept until the end of the search is near.
+    Frozen,
+    /// They are kept but for what the step shows.
+    Broyden,
 }
 
 /// Frames `first`, `first + step`, ... up to and including `last` (or the end of the recording); counted from 0.

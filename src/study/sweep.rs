@@ -173,7 +173,12 @@ impl<'s> Sweep<'s> {
             };
             let own =
                 self.study.estimate.then(|| with_threads(&variant.change, || Ok(estimate(&prepared, &solution))));
-            let own = own.transpose()?.map(|own| own.map_err(|why| Failed { code: why.code, message: why.message }));
+            let own = own.transpose()?.map(|own| {
+                own.map_err(|why| {
+                    let message = why.message.lines().next().unwrap_or_default().to_owned();
+                    Failed { code: why.code, message }
+                })
+            });
             let solved = Solved { estimate: own, ..describe(&prepared, &solution, errors) };
             Ok((prepared, solved))
         };

@@ -102,15 +102,16 @@ fn a_fibre_is_stretched_by_half_and_then_activated() {
         })
     };
     assert!(uniform(&weak));
-    assert!(
-        model.descending_fibres(&weak.state).is_empty(),
-        "the passive force rises faster than the active one falls"
-    );
+    let descending =
+        |activation| model.descending_fibres(&State { controls: vec![activation], ..weak.state.clone() });
+    assert!(descending(0.1).is_empty(), "the passive force rises faster than the active one falls");
     // active enough, every fibre of the uniform state is on its descending limb
-    let descending = model.descending_fibres(&State { controls: vec![0.4], ..weak.state.clone() });
+    let descending = descending(0.2);
     let [all] = descending[..] else { panic!("{descending:?}") };
     assert!(all.points == 54 && all.of == 54 && (all.stretch - 1.5).abs() < 1e-6, "{all:?}");
     let strong = stable("then activated by 0.4", &mut solver, &weak.state, &drive(&[0.4], 1.0));
     assert!(!strong.snaps.is_empty() && strong.snaps[0].modes > 0, "{:?}", strong.snaps);
     assert!(!uniform(&strong));
+    let [some] = model.descending_fibres(&strong.state)[..] else { panic!("no fibre is long") };
+    assert!(some.points < 54 && some.stretch > 1.5, "{some:?}");
 }

@@ -93,7 +93,7 @@ pub fn assert_in_balance(case: &str, model: &Model, state: &State) {
     let allowed = IMBALANCE * found.magnitude + ROUNDING * model.force_scale();
     assert!(residual <= allowed, "{case}: imbalance {residual:.1e} mN, allowed {allowed:.1e}");
     assert!(found.det_f.min > 0.0 && found.det_f.max.is_finite(), "{case}: det F {:?}", found.det_f);
-    for (parameter, component, value) in model.supports().prescribed(model.mesh(), state.load) {
+    for (parameter, component, value) in model.supports().prescribed(model.mesh(), state.load, &state.controls) {
         let missing = (state.u[parameter][component] - value).abs();
         assert!(missing <= 1e-12 * model.element_size(), "{case}: {missing:.1e} mm of prescribed motion are missing");
     }

@@ -10,8 +10,8 @@ use crate::report::run_folder::RunFolder;
 pub struct MuscleTable(Table);
 
 impl MuscleTable {
-    /// A new table. The mean of the fibre stretch is weighted by reference volume; `descending_points` counts the active
-    /// points that are stretched beyond 1.4 and lose force as they lengthen.
+    /// A new table. The mean of the fibre stretch is weighted by reference volume; `descending_points` counts the
+    /// points on the descending limb ([`Model::descending_fibres`](crate::model::Model::descending_fibres)).
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io), here and below.
