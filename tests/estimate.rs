@@ -121,9 +121,32 @@ fn for_small_loads_it_is_the_difference_to_the_halved_mesh() {
 }
 
 #[test]
+fn a_correction_keeps_what_is_tied() {
+    let tied = "[[load]]\ntraction = { face = \"xi1=1\", kpa = [0, 0, -0.02] }\n[[attachment]]\nposition_mm = [20, 4, 0]\nrigid = true\n\
+                [[probe]]\nname = \"tied\"\nposition_mm = [20, 4, 0]\n[[probe]]\nname = \"corner\"\nposition_mm = [20, 0, 6]\n";
+    let scene = scene(&[CLAMP, tied].concat(), &[]);
+    let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let settings = Settings::default();
+    let found = solved(&built, &scene, settings);
+    let halved = halved(&scene, &built);
+    let mut estimator = Estimator::new(&built.model, &halved, settings).expect("it fits");
+    let corrected = estimator.corrected(&found.state).unwrap_or_else(|error| panic!("{error}"));
+    let shift = estimator.shift(&found.state, &corrected, &built.probes);
+    let [tied, corner] = [0, 1].map(|k: usize| norm(shift[k]));
+    assert!(corner > 1e-3 && tied < 1e-6 * corner, "{tied:.2e} and {corner:.2e} mm");
+}
+
+#[test]
 fn what_cannot_be_halved_says_why() {
-    let contact = "[[contact]]\nface = \"xi3=0\"\nplane = { through_mm = [0, 0, -1], normal = [0, 0, 1] }\n\
-                   augmented = { kpa_per_mm = 5, gap_mm = 0.001 }\n";
+    let contact = "[[contact]]\nface = \"xi3=0\"\nsurface = { plane = { through_mm = [0, 0, -1], normal = [0, 0, 1] } }\n\
+                   law = { augmented = { kpa_per_mm = 5, gap_mm = 0.001 } }\n";
+    let soft = scene(
+        &[CLAMP, &contact.replace("augmented = { kpa_per_mm = 5, gap_mm = 0.001 }", "penalty = { kpa_per_mm = 5 }")]
+            .concat(),
+        &[],
+    );
+    let built = build(&soft).unwrap_or_else(|error| panic!("{error}"));
+    assert!(Halved::new(&soft, &built.model).is_ok(), "a penalty has no multipliers");
     let scene = scene(&[CLAMP, contact].concat(), &[]);
     let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
     let warning = Halved::new(&scene, &built.model).err().expect("its multipliers belong to points");
@@ -131,29 +154,45 @@ fn what_cannot_be_halved_says_why() {
     assert!(warning.message.contains("contact") && warning.message.contains("multiplier"), "{}", warning.message);
 }
 
-/// Coarse and fine, soft and stiff: estimates of variants of bending and of the slab beam against their true errors.
+/// Coarse and stiff, with and without a muscle: estimates of variants of bending and of the slab beam against their true
+/// errors. The last variant is so far off that one Newton step does not do.
 #[test]
 fn estimates_are_within_a_factor_of_three_of_true_errors() {
+    // of a muscle, the reference needs as many points per element as the variants have
+    let bending = "reference = { set = { \"mesh.block.elements\" = [8, 2, 2], \"tissue.kappa_kpa\" = 1 } }
+[[study.vary]]
+key = \"mesh.block.elements\"
+values = [[2, 1, 1], [4, 1, 1]]
+[[study.vary]]
+key = \"tissue.pressure\"
+values = [\"trilinear\", \"discontinuous-trilinear\"]
+[[study.vary]]
+key = \"tissue.kappa_kpa\"
+values = [10, 100]";
+    let slab = "reference = { set = { \"mesh.block.elements\" = [12, 2, 2], \"tissue.kappa_kpa\" = 1, \"muscle.slab.gauss\" = 8 } }
+[[study.variant]]
+name = \"short elements\"
+set = { \"mesh.block.elements\" = [6, 1, 1] }
+[[study.variant]]
+name = \"long elements\"
+set = { \"mesh.block.elements\" = [3, 1, 1] }
+[[study.variant]]
+name = \"long elements that lock\"
+set = { \"mesh.block.elements\" = [3, 1, 1], \"tissue.kappa_kpa\" = 100 }";
     let problems = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems");
     let folder = tempfile::tempdir().expect("a folder");
     let mut ratios = Vec::new();
-    for (problem, hosts, reference) in
-        [("bending", "[[2, 1, 1], [4, 1, 1]]", "[8, 2, 2]"), ("slab", "[[3, 1, 1], [6, 1, 1]]", "[12, 2, 2]")]
-    {
-        let study = format!(
-            "[task]\nkind = \"study\"\n[study]\nproblem = {:?}\nmeasure = \"displacement\"\nestimate = true\n\
-             repetitions = 1\nreference = {{ set = {{ \"mesh.block.elements\" = {reference}, \"tissue.kappa_kpa\" = 1 }} }}\n\
-             [[study.vary]]\nkey = \"mesh.block.elements\"\nvalues = {hosts}\n\
-             [[study.vary]]\nkey = \"tissue.pressure\"\nvalues = [\"trilinear\", \"discontinuous-trilinear\"]\n\
-             [[study.vary]]\nkey = \"tissue.kappa_kpa\"\nvalues = [10, 100]\n",
-            problems.join(problem).join("problem.toml")
-        );
+    for (problem, rest) in [("bending", bending), ("slab", slab)] {
+        let file = problems.join(problem).join("problem.toml");
+        let head = "measure = \"displacement\"\nestimate = true\nrepetitions = 1";
+        let text = format!("[task]\nkind = \"study\"\n[study]\nproblem = {file:?}\n{head}\n{rest}\n");
         let path = folder.path().join(format!("{problem}.toml"));
-        std::fs::write(&path, study).expect("written");
+        std::fs::write(&path, text).expect("written");
         let Problem::Study(study) = Problem::read(&path, &[]).unwrap_or_else(|error| panic!("{error}")) else {
             panic!("a study")
         };
         let outcome = Sweep::new(&study, &mut |_| {}, &|| false).run().unwrap_or_else(|error| panic!("{error}"));
+        let before = ratios.len();
         for result in &outcome.variants {
             let solved = result.ending.as_ref().unwrap_or_else(|why| panic!("{}: {why:?}", result.variant.name));
             let own = solved.estimate.as_ref().expect("asked for");
@@ -163,7 +202,11 @@ fn estimates_are_within_a_factor_of_three_of_true_errors() {
             println!("{problem} {}: {estimate:.4} of {known:.4} mm", result.variant.name);
             ratios.push(estimate / known);
         }
+        let good = ratios[before..].iter().filter(|ratio| (1.0 / 3.0..=3.0).contains(*ratio)).count();
+        let page = risorius::report::study::page(&study, &outcome);
+        let told = format!("Within a factor of 3 of the true error: {good} of {} variants", outcome.variants.len());
+        assert!(page.contains(&told), "{told} is not in\n{page}");
     }
     let good = ratios.iter().filter(|ratio| (1.0 / 3.0..=3.0).contains(*ratio)).count();
-    assert!(ratios.len() == 16 && 10 * good >= 8 * ratios.len(), "{good} of {ratios:?}");
+    assert!(ratios.len() == 11 && 10 * good >= 8 * ratios.len(), "{good} of {ratios:?}");
 }

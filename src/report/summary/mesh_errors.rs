@@ -78,8 +78,11 @@ impl fmt::Display for MeshErrors {
 
 /// A value with two digits that count.
 fn short(value: f64) -> String {
+    if value.abs() < 1e-5 {
+        return format!("{value:.1e}");
+    }
     let digits = (1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
-    if value.abs() >= 1e-5 { format!("{value:.digits$}") } else { format!("{value:.1e}") }
+    format!("{value:.digits$}")
 }
 
 fn signed(value: f64) -> String {
