@@ -6,7 +6,7 @@
 //! of the last frame. Probes, markers and activations are compared in all frames.
 
 use super::solution::{Prepared, Solution};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::quadrature::GaussRule;
 use crate::math::tensor::{Matrix, Vector, determinant, inverse, norm, subtract};
 use crate::mesh::location::Locator;
@@ -120,13 +120,16 @@ pub fn against_values(problem: &Prepared, found: &Solution, values: &[(String, f
     errors
 }
 
-/// Against known activations over time, a table `time_s,<control>,...`.
+/// Against known activations over time, a table `time_s,<control>,...`; other columns are passed over.
 ///
 /// # Errors
 /// A table that cannot be read.
 pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -> Result<Errors> {
     let names: Vec<&str> = problem.built.model.controls().iter().map(|c| c.name.as_str()).collect();
-    let truth = Curves::read(table, &problem.scene.control_ranges())?;
+    let text =
+        std::fs::read_to_string(table).map_err(|source| Error::Io { action: "read", path: table.into(), source })?;
+    let truth =
+        Curves::parse(&known_columns(&text, &names), &table.display().to_string(), &problem.scene.control_ranges())?;
     let squares = found.frames.iter().zip(&found.times_s).flat_map(|(frame, time_s)| {
         let known = names.iter().zip(&frame.state.controls);
         known.filter_map(|(name, value)| Some((truth.at(name, *time_s)? - value).powi(2))).collect::<Vec<f64>>()
@@ -134,6 +137,18 @@ pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -
     let mut errors = Errors::default();
     errors.set(Measure::Activations, root_mean(squares));
     Ok(errors)
+}
+
+/// The columns `time_s` and `names` of a table.
+fn known_columns(text: &str, names: &[&str]) -> String {
+    let header: Vec<&str> = text.lines().next().unwrap_or_default().split(',').collect();
+    let keep = |name: &&str| name.trim() == "time_s" || names.contains(&name.trim());
+    let kept: Vec<usize> = (0..header.len()).filter(|k| keep(&header[*k])).collect();
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        kept.iter().filter_map(|k| cells.get(*k).copied()).collect::<Vec<_>>().join(",") + "\n"
+    };
+    text.lines().map(row).collect()
 }
 
 fn squares_between<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = f64> + 'a {

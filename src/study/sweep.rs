@@ -182,10 +182,14 @@ impl<'s> Sweep<'s> {
             let solved = Solved { estimate: own, ..describe(&prepared, &solution, errors) };
             Ok((prepared, solved))
         };
-        solve().map_err(|error| Failed {
+        // of several mistakes the first
+        let first = |error: Error| error.into_mistakes().into_iter().next();
+        let failed = |error: Error| Failed {
             code: error.code(),
             message: error.to_string().lines().next().unwrap_or_default().to_owned(),
-        })
+        };
+        let unknown = || Failed { code: "-", message: String::new() };
+        solve().map_err(|error| first(error).map_or_else(unknown, failed))
     }
 }
 
