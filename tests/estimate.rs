@@ -1,6 +1,8 @@
 //! The estimate of the discretisation error: states are carried to halved elements exactly, nothing is estimated where
 //! nothing is wrong, to first order the estimate is the difference to the halved mesh's solution, and it is near true errors.
 
+use risorius::fit::bias::bias;
+use risorius::fit::sequence::{settings, sought};
 use risorius::forward::drives::drives;
 use risorius::forward::estimate::{BEYOND_HALVED, Estimator};
 use risorius::forward::{Equilibrium, Settings, Solver, evaluate};
@@ -8,8 +10,8 @@ use risorius::math::tensor::{Vector, norm, subtract};
 use risorius::model::State;
 use risorius::model::build::{Built, build};
 use risorius::model::halved::Halved;
-use risorius::scene::{Measure, Problem, Scene};
-use risorius::study::Sweep;
+use risorius::scene::{Change, Measure, Problem, Scene};
+use risorius::study::{Prepared, Sweep};
 use std::path::Path;
 
 /// A bar of two by one elements, with what else the text says.
@@ -152,6 +154,36 @@ fn what_cannot_be_halved_says_why() {
     let warning = Halved::new(&scene, &built.model).err().expect("its multipliers belong to points");
     assert_eq!(warning.code, "S013");
     assert!(warning.message.contains("contact") && warning.message.contains("multiplier"), "{}", warning.message);
+}
+
+/// The bias of fitted activations is the difference to a fit with the model on halved elements, where its marker shift is
+/// taken as it is.
+#[test]
+fn the_bias_of_a_fit_is_the_difference_to_a_better_fit() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/beam/problem.toml");
+    let fitted = |set: &[&str]| {
+        let frame = "fit.frames={first=16,last=16}";
+        let set = set.iter().chain(&[frame]).map(|s| (*s).to_owned()).collect();
+        let prepared = Prepared::read(&path, &Change { set, ..Change::default() });
+        let prepared = prepared.unwrap_or_else(|error| panic!("{error}"));
+        let solution = prepared.solve().unwrap_or_else(|error| panic!("{error}"));
+        (prepared, solution)
+    };
+    let (own, solution) = fitted(&["mesh.block.elements=[3,1,1]"]);
+    let (_, better) = fitted(&["mesh.block.elements=[6,2,2]", "muscle.top.gauss=6", "muscle.bottom.gauss=6"]);
+    let (model, fit) = (&own.built.model, own.scene.fit.as_ref().expect("a fit"));
+    let halved = Halved::new(&own.scene, model).unwrap_or_else(|warning| panic!("{}", warning.message));
+    let mut estimator = Estimator::new(model, &halved, settings(&own.scene)).expect("it fits");
+    let state = &solution.frames[0].state;
+    let corrected = estimator.corrected(state).unwrap_or_else(|error| panic!("{error}"));
+    let shift = estimator.shift(state, &corrected, &solution.points());
+    let biases = bias(&solution.fits[0], &solution.markers, &sought(fit, model), &shift);
+    for (k, bias) in biases.iter().enumerate() {
+        let estimate = bias.expect("free") / BEYOND_HALVED;
+        let known = state.controls[k] - better.frames[0].state.controls[k];
+        println!("{}: {estimate:.3e} of {known:.3e}", model.controls()[k].name);
+        assert!((estimate - known).abs() < 0.05 * known.abs(), "{estimate:.3e} of {known:.3e}");
+    }
 }
 
 /// Coarse and stiff, with and without a muscle: estimates of variants of bending and of the slab beam against their true
