@@ -193,7 +193,7 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
 }
 
 fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
-    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, blemker, place: _ } = muscle;
+    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, cut, taper_mm, blemker, place: _ } = muscle;
     let activation = match activation {
         ActivationSpec::Uniform => "uniform",
         ActivationSpec::Field => "field",
@@ -216,6 +216,10 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
         },
         format!("activation = \"{activation}\""),
         format!("gauss = {gauss}"),
+        format!("cut = {cut}"),
+    ]);
+    lines.extend(taper_mm.map(|taper| format!("taper_mm = {}", number(taper))));
+    lines.extend([
         format!(
             "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
             number(*sigma_max_kpa),
