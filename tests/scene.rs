@@ -183,7 +183,9 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     expect("topic = \"/markers\"", "topic = 7", "C004", "7", "write it in quotes");
     expect("[[probe]]", "[probe]", "C004", "[probe]", "[[probe]]");
     expect("gauss = 5", "gauss = true", "C004", "true", "a whole number");
+    expect("gauss = 3", "cut = 1", "C004", "1\nblemker", "true or false");
     // C005 out of range
+    expect("gauss = 3", "taper_mm = 0", "C005", "0\nblemker", "= 0 mm is not allowed: it must be greater than 0");
     expect("kappa_kpa = 10.0", "kappa_kpa = -1", "C005", "-1", "= -1 kPa is not allowed: it must be 0 or more");
     expect("kappa_kpa = 10.0", "kappa_kpa = nan", "C005", "nan", "a finite number");
     expect("kappa_kpa = 10.0", "kappa_kpa = 1e999", "C005", "1e999", "a finite number");
@@ -342,6 +344,8 @@ fn overrides_are_merged_before_anything_is_checked() {
     assert_eq!(set(&["muscle[1].gauss=4"]).muscles[1].gauss, 4);
     assert_eq!(set(&["muscle.risorius.L.gauss=5"]).muscles[1].gauss, 5);
     assert_eq!(set(&["muscle.\"risorius.L\".gauss=6"]).muscles[1].gauss, 6);
+    let muscle = &set(&["muscle.slab.cut=true", "muscle.slab.taper_mm=2.5"]).muscles[0];
+    assert_eq!((muscle.cut, muscle.taper_mm), (true, Some(2.5)));
     assert_eq!(set(&["controls.risorius.L=0.5"]).controls[0].value, ControlValue::Constant(0.5));
     assert_eq!(set(&["controls.\"risorius.L\" = 0.5"]).controls.len(), 1);
     assert_eq!(set(&["controls.slab=0.1"]).controls[1].name, "slab");
@@ -791,6 +795,8 @@ proptest! {
         scene.tissue.law = LawSpec::MooneyRivlin { c1_kpa: c1, c2_kpa: 1e-3 };
         scene.tissue.kappa_kpa = kappa;
         scene.muscles[0].fibres = FibresSpec::Uniform([angle, 0.0, -0.0]);
+        scene.muscles[0].cut = angle > 0.0;
+        scene.muscles[0].taper_mm = (c1 > 0.0).then_some(c1);
         scene.controls[0].value = ControlValue::Constant(activation);
         scene.probes[0].name = name;
         scene.fit.as_mut().unwrap().topic = Some(topic);

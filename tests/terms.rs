@@ -24,6 +24,7 @@ use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Pla
 use risorius::term::contact::{Contact, Interface};
 use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use risorius::term::muscle::{Activation, Muscle};
+use risorius::term::muscle_rule::MuscleRule;
 use risorius::term::pressure::{self, PRESSURE_SPACES, PressureSpace};
 use risorius::term::spring::{Resists, Springs};
 use risorius::term::tie::RigidTies;
@@ -48,12 +49,26 @@ fn muscle(host: &Mesh, element: &'static dyn Element) -> Box<dyn Term> {
 }
 
 fn activated(host: &Mesh, element: &'static dyn Element, activation: Activation) -> Box<dyn Term> {
+    let (mesh, angles) = twisted(element);
+    let muscle = Muscle::new("muscle", &Locator::new(host), &mesh, &angles, 3, FIBRE, activation).expect("embedded");
+    Box::new(muscle)
+}
+
+/// The same with a rule that is cut and fibres that end softly.
+fn tapered(host: &Mesh) -> Box<dyn Term> {
+    let (mesh, angles) = twisted(&Trilinear);
+    let locator = Locator::new(host);
+    let rule = MuscleRule::cut(&mesh, &locator, 2);
+    let muscle = Muscle::with_rule("muscle", &locator, &mesh, &angles, &rule, FIBRE, 0).expect("embedded");
+    Box::new(muscle.tapered(&Locator::new(&mesh), 3.0))
+}
+
+fn twisted(element: &'static dyn Element) -> (Mesh, FibreAngles) {
     let mut mesh = block(element, [3.0, 4.0, 3.0], [14.0, 11.0, 4.0], [2, 1, 1]);
     let mut random = Random::new(22);
     mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
     let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
-    let muscle = Muscle::new("muscle", &Locator::new(host), &mesh, &angles, 3, FIBRE, activation).expect("embedded");
-    Box::new(muscle)
+    (mesh, angles)
 }
 
 /// A model of the host with the given terms alone.
@@ -84,6 +99,7 @@ fn cases() -> Vec<(String, Model)> {
     single("muscle of Hermite elements", &|mesh| muscle(mesh, &TricubicHermite));
     single("muscle of trilinear elements", &|mesh| muscle(mesh, &Trilinear));
     single("muscle with a field of activations", &|mesh| activated(mesh, &Trilinear, Activation::Field(0)));
+    single("muscle with a cut rule and tapered fibres", &|mesh| tapered(mesh));
     single("traction", &|mesh| Box::new(traction(mesh, &mesh.named_faces["xi1=1"], [0.3, -0.2, 0.5], 4)));
     // gauss = 3: 36 points; the plane and the sphere meet a part of them
     for (name, allows, surface, law, relax) in contacts() {

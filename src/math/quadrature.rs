@@ -42,12 +42,31 @@ impl GaussRule {
         self.points.is_empty()
     }
 
+    /// This rule in every part of [0, 1] between `cuts`, which lie in (0, 1) and ascend.
+    pub fn composite(&self, cuts: &[f64]) -> GaussRule {
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        let mut low = 0.0;
+        for high in cuts.iter().copied().chain([1.0]) {
+            let length = high - low;
+            points.extend(self.points.iter().map(|x| low + length * x));
+            weights.extend(self.weights.iter().map(|w| length * w));
+            low = high;
+        }
+        GaussRule { points, weights }
+    }
+
     /// Points and weights on the unit cube, first direction fastest.
     pub fn cube(&self) -> impl Iterator<Item = ([f64; 3], f64)> + '_ {
-        let n = self.len();
-        (0..n * n * n).map(move |q| {
-            let (i, j, k) = (q % n, q / n % n, q / (n * n));
-            ([self.points[i], self.points[j], self.points[k]], self.weights[i] * self.weights[j] * self.weights[k])
+        GaussRule::product([self; 3])
+    }
+
+    /// Points and weights on the unit cube with a rule for each direction, first direction fastest.
+    pub fn product(rules: [&GaussRule; 3]) -> impl Iterator<Item = ([f64; 3], f64)> + '_ {
+        let [a, b, c] = rules;
+        let (n, m) = (a.len(), b.len());
+        (0..n * m * c.len()).map(move |q| {
+            let (i, j, k) = (q % n, q / n % m, q / (n * m));
+            ([a.points[i], b.points[j], c.points[k]], a.weights[i] * b.weights[j] * c.weights[k])
         })
     }
 

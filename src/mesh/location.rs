@@ -55,16 +55,21 @@ impl<'m> Locator<'m> {
     ///
     /// Errors: [`Outside`] with the nearest point when no element holds it.
     pub fn locate(&self, x: Vector) -> Result<MaterialPoint, Outside> {
+        self.holder(x).ok_or_else(|| self.nearest(x))
+    }
+
+    /// The same without a search for the nearest point where no element holds it.
+    pub fn holder(&self, x: Vector) -> Option<MaterialPoint> {
         let margin = 1e-9 * self.scale;
         let around = AABB::from_corners(x.map(|c| c - margin), x.map(|c| c + margin));
         let mut candidates: Vec<usize> = self.tree.locate_in_envelope_intersecting(around).map(|b| b.data).collect();
         candidates.sort_unstable();
         for element in candidates {
             if let Some(xi) = self.invert(element, x) {
-                return Ok(MaterialPoint { element, xi });
+                return Some(MaterialPoint { element, xi });
             }
         }
-        Err(self.nearest(x))
+        None
     }
 
     /// Newton's method on x(xi) = x from the middle and, where that fails, from the corners and face centres.

@@ -28,6 +28,7 @@ use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane,
 use crate::term::contact::{Contact, Interface};
 use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use crate::term::muscle::{Activation, Muscle, NotEmbedded};
+use crate::term::muscle_rule::MuscleRule;
 use crate::term::pressure::{self, PressureSpace};
 use crate::term::spring::{Resists, Springs};
 use std::sync::Arc;
@@ -295,7 +296,15 @@ fn embed(
         p1: b.p1,
         p2: b.p2,
     };
-    let muscle = Muscle::new(&spec.name, locator, &mesh, &angles, spec.gauss, law, activation);
+    let rule = match spec.cut {
+        true => MuscleRule::cut(&mesh, locator, spec.gauss),
+        false => MuscleRule::uniform(&mesh, spec.gauss),
+    };
+    let muscle = Muscle::with_rule(&spec.name, locator, &mesh, &angles, &rule, law, activation);
+    let muscle = muscle.map(|muscle| match spec.taper_mm {
+        Some(taper) => muscle.tapered(&Locator::new(&mesh), taper),
+        None => muscle,
+    });
     muscle.map(|muscle| (muscle, names, warning)).map_err(|error| match error {
         NotEmbedded::Outside { count, of, element, position, distance } => {
             Error::MuscleOutside(Box::new(MuscleOutside {
@@ -432,6 +441,7 @@ fn start_of_contact(
 /// `host_element` is the mean volume of a host element, mm3.
 fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_element: f64) -> Option<Warning> {
     let fewest = match (&spec.geometry, host) {
+        _ if spec.cut => spec.gauss as f64,
         (GeometrySpec::Block(own), GeometrySpec::Block(host)) => {
             let element = |block: &BlockSpec, d: usize| block.size_mm[d] / block.elements[d] as f64;
             let points = |d| spec.gauss as f64 * element(host, d) / element(own, d);
@@ -444,6 +454,12 @@ fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_ele
         return None;
     }
     let enough = (spec.gauss as f64 * POINTS_PER_HOST_ELEMENT / fewest).ceil();
+    let help = match spec.cut {
+        true => format!("use gauss = {enough:.0} for this muscle, 3 is enough"),
+        false => format!(
+            "write cut = true for this muscle: then gauss = 3 is enough; or gauss = {enough:.0}, or more elements in its mesh"
+        ),
+    };
     Some(Warning {
         code: "G007",
         message: format!(
@@ -451,7 +467,7 @@ fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_ele
             spec.name
         ),
         place: Some(spec.place.clone()),
-        help: Some(format!("use gauss = {enough:.0} for this muscle, or more elements in its mesh")),
+        help: Some(help),
     })
 }
 

@@ -267,6 +267,8 @@ fn muscle(table: &mut Table, references: &References) -> Option<MuscleSpec> {
     let activations = [("uniform", ActivationSpec::Uniform), ("field", ActivationSpec::Field)];
     let activation = table.or("activation", ActivationSpec::Uniform, |item| item.choice(&activations, &[]));
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
+    let cut = table.or("cut", false, |item| item.flag());
+    let taper_mm = table.optional("taper_mm", |item| item.number(POSITIVE));
     let example = "blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }";
     let blemker = table.required("blemker", example, |item| item.table(blemker));
     Some(MuscleSpec {
@@ -276,6 +278,8 @@ fn muscle(table: &mut Table, references: &References) -> Option<MuscleSpec> {
         fibres: fibres?,
         activation: activation?,
         gauss: gauss?,
+        cut: cut?,
+        taper_mm: taper_mm?,
         blemker: blemker?,
         place: table.place(),
     })

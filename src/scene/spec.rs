@@ -184,8 +184,12 @@ pub struct MuscleSpec {
     pub fibres: FibresSpec,
     /// Whether it has one activation or a field of them.
     pub activation: ActivationSpec,
-    /// Gauss points per direction and muscle element, 1 to 8.
+    /// Gauss points per direction in every element, or in every part of one if the rule is cut, 1 to 8.
     pub gauss: usize,
+    /// Whether elements are divided for the rule where they pass into another element of the host.
+    pub cut: bool,
+    /// The length over which fibres end one after the other, mm.
+    pub taper_mm: Option<f64>,
     /// The constants of its force-stretch law.
     pub blemker: BlemkerSpec,
     /// The table in the file.

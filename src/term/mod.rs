@@ -10,8 +10,10 @@ pub mod contact;
 pub mod coupling;
 pub mod load;
 pub mod muscle;
+pub mod muscle_rule;
 pub mod pressure;
 pub mod spring;
+pub mod taper;
 pub mod tie;
 pub mod tissue;
 

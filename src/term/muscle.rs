@@ -12,10 +12,11 @@
 //! The activation is one control everywhere, or a field: a = sum over the muscle's nodes of psi_n a_n, trilinear in its
 //! elements, with a control a_n for every node; then d2Pi/du da_n has psi_n as a further factor.
 
+use super::muscle_rule::MuscleRule;
+use super::taper::part_of_fibres;
 use super::{Contribution, ElementState, ElementSystem, Term, Want};
 use crate::material::PAIRS;
 use crate::material::fibre::Blemker;
-use crate::math::quadrature::GaussRule;
 use crate::math::tensor::{Vector, apply_transposed, determinant, dot, inverse, norm};
 use crate::mesh::element::{Element, Trilinear};
 use crate::mesh::fibre_angles::FibreAngles;
@@ -41,11 +42,11 @@ pub struct Muscle {
 pub struct Point {
     /// Where it lies in the host.
     pub host: MaterialPoint,
-    /// Which Gauss point of the muscle it is: element by element, first direction fastest.
+    /// Which point of the muscle's rule it is: element by element, first direction fastest.
     pub index: usize,
     /// Reference position, mm.
     pub position: Vector,
-    /// Gauss weight x det(dX/deta), mm3.
+    /// Weight of the rule x det(dX/deta) x the part of the fibres that is left here, mm3.
     pub weight: f64,
     /// Unit fibre direction in the reference state.
     pub fibre: Vector,
@@ -129,44 +130,56 @@ impl Muscle {
         law: Blemker,
         activation: impl Into<Activation>,
     ) -> Result<Muscle, NotEmbedded> {
+        Muscle::with_rule(name, locator, mesh, angles, &MuscleRule::uniform(mesh, gauss), law, activation)
+    }
+
+    /// The same with the points of `rule`, a rule of `mesh`.
+    pub fn with_rule(
+        name: &str,
+        locator: &Locator<'_>,
+        mesh: &Mesh,
+        angles: &FibreAngles,
+        rule: &MuscleRule,
+        law: Blemker,
+        activation: impl Into<Activation>,
+    ) -> Result<Muscle, NotEmbedded> {
         let activation = activation.into();
         let host = locator.mesh();
-        let rule = GaussRule::new(gauss);
-        let per_element = rule.len().pow(3);
-        let mut points = Vec::with_capacity(mesh.elements() * per_element);
+        let mut points = Vec::new();
         let mut farthest: Option<(usize, Vector, Outside)> = None;
-        let mut outside = 0;
-        for element in 0..mesh.elements() {
-            let local = mesh.local(element);
-            for (q, (eta, weight)) in rule.cube().enumerate() {
-                let (position, jacobian) = position_and_jacobian(mesh.element, &local, eta);
-                let det = determinant(&jacobian);
-                if det.is_nan() || det <= 0.0 {
-                    return Err(NotEmbedded::Inverted { element, det });
-                }
-                let fibre = angles.direction(mesh, element, &local, eta);
-                match locator.locate(position) {
-                    Ok(at) => points.push(Point {
-                        host: at,
-                        index: element * per_element + q,
-                        position,
-                        weight: weight * det,
-                        fibre,
-                        shares: activation.shares(mesh, element, eta),
-                        gradient: directional_gradient(host, at, fibre),
-                    }),
-                    Err(found) => {
-                        outside += 1;
-                        if farthest.is_none_or(|(_, _, f)| found.distance > f.distance) {
-                            farthest = Some((element, position, found));
-                        }
+        let (mut all, mut outside) = (0, 0);
+        let mut local = (0, mesh.local(0));
+        for (index, (element, eta, weight)) in rule.points().enumerate() {
+            if local.0 != element {
+                local = (element, mesh.local(element));
+            }
+            let (position, jacobian) = position_and_jacobian(mesh.element, &local.1, eta);
+            let det = determinant(&jacobian);
+            if det.is_nan() || det <= 0.0 {
+                return Err(NotEmbedded::Inverted { element, det });
+            }
+            all += 1;
+            let fibre = angles.direction(mesh, element, &local.1, eta);
+            match locator.locate(position) {
+                Ok(at) => points.push(Point {
+                    host: at,
+                    index,
+                    position,
+                    weight: weight * det,
+                    fibre,
+                    shares: activation.shares(mesh, element, eta),
+                    gradient: directional_gradient(host, at, fibre),
+                }),
+                Err(found) => {
+                    outside += 1;
+                    if farthest.is_none_or(|(_, _, f)| found.distance > f.distance) {
+                        farthest = Some((element, position, found));
                     }
                 }
             }
         }
         if let Some((element, position, Outside { distance, .. })) = farthest {
-            let of = mesh.elements() * per_element;
-            return Err(NotEmbedded::Outside { count: outside, of, element, position, distance });
+            return Err(NotEmbedded::Outside { count: outside, of: all, element, position, distance });
         }
         points.sort_by_key(|p| (p.host.element, p.index));
         let mut starts = vec![0; host.elements() + 1];
@@ -180,7 +193,15 @@ impl Muscle {
         Ok(Muscle { name: name.to_owned(), law, controls, points, starts, arch: Arch::new() })
     }
 
-    /// Its activation; of a field the mean over its reference volume.
+    /// With fibres that end softly over `taper` mm ([`super::taper`]); `own` searches the muscle's mesh.
+    pub fn tapered(mut self, own: &Locator<'_>, taper: f64) -> Muscle {
+        for point in &mut self.points {
+            point.weight *= part_of_fibres(own, point.position, point.fibre, taper);
+        }
+        self
+    }
+
+    /// Its activation; of a field the mean over the volume of its fibres.
     pub fn mean_activation(&self, controls: &[f64]) -> f64 {
         match self.controls[..] {
             [control] => controls[control],
@@ -193,7 +214,7 @@ impl Muscle {
         &self.points
     }
 
-    /// Its reference volume, mm3.
+    /// The reference volume of its fibres, mm3: that of the muscle, less by what a taper takes.
     pub fn volume(&self) -> f64 {
         self.points.iter().map(|p| p.weight).sum()
     }
