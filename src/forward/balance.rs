@@ -185,7 +185,8 @@ impl<'m> Balance<'m> {
             self.model.advance(&mut state, &step, 1.0);
             self.work.iterations += 1;
             let after = self.evaluate(&state, Want::Force, None);
-            if after.det_f.min <= 0.0 || !(self.norm(&after.residual) <= self.norm(&residual)) {
+            let lower = self.norm(&after.residual) <= self.norm(&residual);
+            if after.det_f.min <= 0.0 || !lower {
                 return Ok(None);
             }
             residual = after.residual;
