@@ -4,7 +4,6 @@ mod common;
 
 use common::{Random, curved_block};
 use risorius::material::fibre::Blemker;
-use risorius::math::quadrature::GaussRule;
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
@@ -48,9 +47,8 @@ fn a_cut_rule_measures_the_part_of_the_muscle_in_every_host_element() {
             * overlap(2.0, 18.0, at[1], at[1] + 5.0)
             * overlap(14.2, 18.2, at[2], at[2] + 5.0)
     };
-    let worst = |rule: &MuscleRule| {
-        volumes(rule).iter().enumerate().map(|(e, v)| (v - exact(e)).abs()).fold(0.0, f64::max)
-    };
+    let worst =
+        |rule: &MuscleRule| volumes(rule).iter().enumerate().map(|(e, v)| (v - exact(e)).abs()).fold(0.0, f64::max);
     let (cut, uniform) = (worst(&MuscleRule::cut(&slab, &locator, 1)), worst(&MuscleRule::uniform(&slab, 8)));
     assert!(cut < 1e-6, "{cut} mm3");
     assert!(uniform > 1.0, "{uniform} mm3: what a rule that is not cut is off by");
@@ -61,18 +59,16 @@ fn a_cut_rule_measures_the_part_of_the_muscle_in_every_host_element() {
 #[test]
 fn a_cut_rule_follows_curved_meshes() {
     let host = curved_block(&TricubicHermite, [4, 2, 2], 0.05, 51);
-    let mut mesh = block(&TricubicHermite, [4.0, 4.0, 8.0], [32.0, 11.0, 6.0], [2, 1, 1]);
+    let mut mesh = block(&TricubicHermite, [4.0, 4.0, 8.0], [32.0, 11.0, 6.0], [1, 1, 1]);
     let mut random = Random::new(52);
     mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
     let locator = Locator::new(&host);
     let uniform = embed(&host, &mesh, &MuscleRule::uniform(&mesh, 8), 0.3);
     let rule = MuscleRule::cut(&mesh, &locator, 3);
-    // every muscle element passes two host elements in each direction
-    assert_eq!(rule.points().count(), 2 * 8 * 27);
+    // it passes four host elements in one direction and two in the others
+    assert_eq!(rule.points().count(), 4 * 2 * 2 * 27);
     let cut = embed(&host, &mesh, &rule, 0.3);
     assert!((cut.volume() / uniform.volume() - 1.0).abs() < 1e-4, "{} and {}", cut.volume(), uniform.volume());
-    let exact = GaussRule::new(8).cube().map(|(_, w)| w).sum::<f64>();
-    assert!((exact - 1.0).abs() < 1e-14);
 }
 
 /// The force of a muscle in a host of which each parameter moved at random.
@@ -82,8 +78,7 @@ fn force(host: &Mesh, muscle: &Muscle) -> Vec<f64> {
     let mut all = Vec::new();
     for element in 0..host.elements() {
         let (local, u, p) = (host.local_of(element, &x), [[0.0; 64]; 3], [0.0; MAX_PRESSURES]);
-        let state =
-            ElementState { element, x: &local, u: &u, p: &p, controls: &[0.05], load: 1.0, multipliers: &[] };
+        let state = ElementState { element, x: &local, u: &u, p: &p, controls: &[0.05], load: 1.0, multipliers: &[] };
         let mut system = ElementSystem::default();
         muscle.add(&state, Want::Force, &mut system);
         all.extend(system.force.iter().flatten().copied());
@@ -98,9 +93,8 @@ fn three_points_in_every_part_do_more_than_eight_in_every_element() {
     let of = |rule: &MuscleRule| force(&host, &embed(&host, &slab, rule, 0.0));
     let best = of(&MuscleRule::cut(&slab, &locator, 8));
     let scale = best.iter().map(|f| f * f).sum::<f64>().sqrt();
-    let error = |rule: &MuscleRule| {
-        of(rule).iter().zip(&best).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt() / scale
-    };
+    let error =
+        |rule: &MuscleRule| of(rule).iter().zip(&best).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt() / scale;
     let cut = error(&MuscleRule::cut(&slab, &locator, 3));
     let [three, eight] = [3, 8].map(|gauss| error(&MuscleRule::uniform(&slab, gauss)));
     println!("error of the force: cut {cut:.2e}, 3 points {three:.2e}, 8 points {eight:.2e}");
@@ -135,7 +129,7 @@ fn a_taper_falls_along_the_fibre_to_both_its_ends() {
                 ahead.min(((x - 4.5) / cosine).min((y - 2.0) / sine))
             };
             let (found, expected) = (point.weight / full.weight, smooth(d, 5.0));
-            assert!((found - expected).abs() < 1e-9, "{degrees} degrees at {x} {y}: {found}, not {expected}");
+            assert!((found - expected).abs() < 1e-7, "{degrees} degrees at {x} {y}: {found}, not {expected}");
         }
     }
     // half of each taper is left
@@ -147,15 +141,19 @@ fn a_taper_falls_along_the_fibre_to_both_its_ends() {
 #[test]
 fn a_muscle_with_few_points_per_host_element_is_warned_of_and_a_cut_one_is_not() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/slab/problem.toml");
-    let warned = |set: &[&str]| {
+    let help = |set: &[&str]| {
         let set: Vec<String> = set.iter().map(|s| s.to_string()).collect();
         let scene = Scene::read_changed(&path, &set, &[]).expect("a problem");
         let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
-        built.warnings.iter().any(|w| w.code == "G007" && w.help.as_ref().is_some_and(|h| h.contains("cut = true")))
+        let warning = built.warnings.into_iter().find(|warning| warning.code == "G007");
+        warning.map(|warning| warning.help.expect("a remedy"))
     };
     let fine = "mesh.block.elements=[12, 4, 4]";
-    assert!(warned(&[fine]));
-    assert!(!warned(&[fine, "muscle.slab.cut=true"]));
-    assert!(warned(&["muscle.slab.cut=true", "muscle.slab.gauss=1"]));
-    assert!(!warned(&[]));
+    let told = help(&[fine]).expect("1.5 points along a host element");
+    assert!(told.contains("cut = true") && told.contains("gauss = 4,"), "{told}");
+    assert_eq!(help(&[fine, "muscle.slab.gauss=4"]), None);
+    assert_eq!(help(&[fine, "muscle.slab.cut=true"]), None);
+    let told = help(&[fine, "muscle.slab.cut=true", "muscle.slab.gauss=1"]).expect("one point in every part");
+    assert!(told.contains("gauss = 3"), "{told}");
+    assert_eq!(help(&[]), None);
 }

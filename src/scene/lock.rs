@@ -192,7 +192,8 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
 }
 
 fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
-    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, cut, taper_mm, blemker, place: _ } = muscle;
+    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, cut, taper_mm, blemker, place: _ } =
+        muscle;
     let activation = match activation {
         ActivationSpec::Uniform => "uniform",
         ActivationSpec::Field => "field",
@@ -218,16 +219,14 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
         format!("cut = {cut}"),
     ]);
     lines.extend(taper_mm.map(|taper| format!("taper_mm = {}", number(taper))));
-    lines.extend([
-        format!(
-            "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
-            number(*sigma_max_kpa),
-            number(*lambda_star),
-            number(*lambda_ofl),
-            number(*p1),
-            number(*p2)
-        ),
-    ]);
+    lines.extend([format!(
+        "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
+        number(*sigma_max_kpa),
+        number(*lambda_star),
+        number(*lambda_ofl),
+        number(*p1),
+        number(*p2)
+    )]);
 }
 
 fn bone_lines(bone: &BoneSpec, lines: &mut Vec<String>) {
