@@ -523,3 +523,53 @@ fn a_run_tells_of_snaps_of_descending_fibres_and_of_failed_steps() {
 }
 
 const HELD: &str = "[[support]]\nplate = { face = \"xi1=1\", offset_mm = 4.8 }";
+
+#[test]
+fn an_estimate_of_the_error_is_told_written_and_costed() {
+    let folder = folder();
+    let page = stdout(&folder, &["run", "-q", "cantilever.toml", "--estimate", "--out", "out"], 0);
+    assert!(page.contains("estimated error of the mesh: tip ") && page.contains("one corrected solve"), "{page}");
+    let out = folder.path().join("out");
+    let table = fs::read_to_string(out.join("tables/estimate.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows[0], ["frame", "time_s", "kind", "name", "error_mm", "bias"]);
+    assert_eq!([rows[1][2], rows[2][2], rows[2][3]], ["body", "probe", "tip"]);
+    let [body, tip] = [1, 2].map(|row| rows[row][4].parse::<f64>().unwrap());
+    assert!(rows.len() == 3 && tip > 1e-3 && tip <= body * (1.0 + 1e-9), "{table}");
+    let cost = fs::read_to_string(out.join("tables/cost.csv")).unwrap();
+    assert!(cost.lines().any(|line| line.starts_with("estimate,")), "{cost}");
+    assert!(fs::read_to_string(out.join("problem.lock.toml")).unwrap().contains("\nestimate = true\n"));
+    let page = stdout(&folder, &["check", "cantilever.toml", "--set", "output.estimate=true"], 0);
+    assert!(page.contains("estimate of the error: one more iteration at the end"), "{page}");
+    // what is not asked for is not there
+    let page = stdout(&folder, &["run", "-q", "cantilever.toml", "--out", "plain"], 0);
+    assert!(!page.contains("estimated") && !folder.path().join("plain/tables/estimate.csv").exists(), "{page}");
+}
+
+#[test]
+fn an_estimate_of_a_fit_tells_the_bias_of_its_controls() {
+    let folder = folder();
+    let coarse = ["--set", "mesh.block.elements=[3,1,1]", "--set", "fit.frames={first=10,last=11}"];
+    let page = stdout(&folder, &[&["run", "-q", "--estimate", "--out", "out"][..], &coarse].concat(), 0);
+    assert!(page.contains("2 corrected solves") && page.contains("estimated bias of what was fitted"), "{page}");
+    let table = fs::read_to_string(folder.path().join("out/tables/estimate.csv")).unwrap();
+    let of = |kind: &str| table.lines().filter(|line| line.split(',').nth(2) == Some(kind)).count();
+    assert_eq!([of("body"), of("marker"), of("control")], [2, 24, 4], "{table}");
+    assert!(table.lines().any(|line| line.contains("control,top,,") && !line.ends_with(',')), "{table}");
+}
+
+#[test]
+fn what_has_no_estimate_runs_with_a_warning() {
+    let folder = folder();
+    // any run leaves its mesh as an EX file
+    let problem = CANTILEVER.replace("[controls]\nslab = 0.02", "[controls]\nslab = 0");
+    fs::write(folder.path().join("rest.toml"), &problem).unwrap();
+    stdout(&folder, &["run", "-q", "rest.toml", "--out", "rest"], 0);
+    let own = "block = { origin_mm = [0, 0, 0], size_mm = [40, 10, 10], elements = [2, 1, 1] }";
+    let problem = problem.replace(own, "exf = \"rest/view/result_0000.exf\"").replace("xi1=0", "1:xi1=0");
+    fs::write(folder.path().join("exf.toml"), problem).unwrap();
+    let said = stderr(&folder, &["run", "-q", "--strict", "exf.toml", "--estimate", "--out", "exf"], 5);
+    assert!(said.contains("S013") && said.contains("elements of an EX file cannot be halved"), "{said}");
+    let page = stdout(&folder, &["run", "-q", "exf.toml", "--estimate", "--out", "exf"], 0);
+    assert!(page.contains("tip") && !page.contains("estimated"), "{page}");
+}

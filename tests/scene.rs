@@ -353,6 +353,7 @@ fn overrides_are_merged_before_anything_is_checked() {
     assert_eq!(block(&set(&["mesh.block.elements=[3,1,1]"])).elements, [3, 1, 1]);
     assert_eq!(set(&["fit.units=mm"]).fit.unwrap().units, Units::Mm);
     assert_eq!(set(&["output.every=2", "output.every=3"]).output.every, 3);
+    assert!(set(&["output.estimate=true"]).output.estimate && !set(&[]).output.estimate);
     // A value of the command line may mend the file.
     assert_eq!(parse(&WHOLE.replace("gauss = 5", "gauss = 0"), &["tissue.gauss=4"]).unwrap().tissue.gauss, 4);
 }

@@ -122,6 +122,35 @@ fn finite_differences_give_the_same_answer() {
     }
 }
 
+/// Sensitivities that are kept from step to step change the way, not the answer, though the markers do not fit.
+#[test]
+fn kept_sensitivities_give_the_same_answer() {
+    let twin = twin();
+    let chosen: Vec<usize> = (10..16).collect();
+    let mut frames = frames(&twin.positions_mm);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        for (m, position) in frame.positions_mm.iter_mut().flatten().enumerate() {
+            let off = |i: usize| 0.3 * ((7 * k + 5 * m + 3 * i) as f64).sin();
+            *position = std::array::from_fn(|i| position[i] + off(i));
+        }
+    }
+    let fresh = fit(&twin.labels, &frames, &chosen, "");
+    for reuse in ["frozen", "broyden"] {
+        let kept = fit(&twin.labels, &frames, &chosen, &format!("reuse = \"{reuse}\"\n"));
+        for (a, b) in fresh.iter().zip(&kept) {
+            assert!(a.rms_mm > 0.1, "the markers are off");
+            for (a, b) in a.equilibrium.state.controls.iter().zip(&b.equilibrium.state.controls) {
+                assert!((a - b).abs() < 2e-6, "{reuse}: {a} and {b}");
+            }
+            let [sd_a, sd_b] = [&a.sd, &b.sd].map(|sd| sd.iter().flatten().copied().collect::<Vec<f64>>());
+            assert_eq!(sd_a.len(), sd_b.len());
+            assert!(sd_a.iter().zip(&sd_b).all(|(a, b)| (a - b).abs() < 1e-3 * a), "{reuse}: {sd_a:?} and {sd_b:?}");
+        }
+        let steps = |all: &[Estimate]| all.iter().map(|e| e.iterations.len()).sum::<usize>();
+        println!("{reuse}: {} steps, fresh {}", steps(&kept), steps(&fresh));
+    }
+}
+
 /// dx/dq by the implicit function theorem and by central differences of whole equilibria, in the interior and at rest,
 /// where the difference is one-sided. The step is small because the passive force of a slack fibre has a kink at stretch 1.
 #[test]

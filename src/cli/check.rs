@@ -6,7 +6,8 @@ use super::terminal::print;
 use super::{Ending, Flags, study};
 use crate::error::{Missing, Result};
 use crate::model::Model;
-use crate::scene::{ControlRange, Problem, Scene};
+use crate::model::halved::Halved;
+use crate::scene::{ControlRange, Problem, Scene, Task};
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
@@ -16,8 +17,8 @@ pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         return study::check(&study);
     }
     let source = Source::read(path, flags)?;
-    let Prepared { built, clip, warnings } = prepare(&source)?;
-    let mut page = describe(&source.scene, &built.model);
+    let Prepared { built, clip, halved, warnings } = prepare(&source)?;
+    let mut page = describe(&source.scene, &built.model, halved.as_ref());
     page += &clip.as_ref().map(describe_clip).unwrap_or_default();
     page += if warnings.is_empty() { "ok: no mistakes\n" } else { "ok: no mistakes, but see the warnings\n" };
     flags.warn(&warnings);
@@ -26,7 +27,7 @@ pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
 }
 
 /// Size, effects and cost of a problem in a few lines.
-pub(super) fn describe(scene: &Scene, model: &Model) -> String {
+pub(super) fn describe(scene: &Scene, model: &Model, halved: Option<&Halved>) -> String {
     let (mesh, numbering) = (model.mesh(), model.numbering());
     let mut text = format!(
         "{}: {}; {} elements, {} nodes, {} unknowns ({} pressures, {}), kappa {} kPa\n",
@@ -58,6 +59,16 @@ pub(super) fn describe(scene: &Scene, model: &Model) -> String {
         model.factor_flops() / 1e6,
         8e-6 * model.symbolic().factor_nnz() as f64
     );
+    if let Some(halved) = halved {
+        let model = &halved.built.model;
+        text += &format!(
+            "estimate of the error: one more iteration {}, with {} unknowns: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
+            if scene.task == Task::Fit { "per frame" } else { "at the end" },
+            model.numbering().unknowns(),
+            model.factor_flops() / 1e6,
+            8e-6 * model.symbolic().factor_nnz() as f64
+        );
+    }
     text
 }
 

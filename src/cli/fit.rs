@@ -1,17 +1,18 @@
 //! Task `fit`: activations from a recording, frame after frame.
 
 use super::Flags;
+use super::estimate::Estimates;
 use super::forward::probes;
 use super::noticed::noticed;
-use super::prepare::Clip;
+use super::prepare::{Clip, Prepared};
 use super::progress::Meter;
 use super::run::{Run, Tally};
 use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
+use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
-use crate::model::build::Built;
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
 use crate::scene::{ControlRange, FitSpec, Scene};
@@ -20,17 +21,22 @@ use crate::scene::{ControlRange, FitSpec, Scene};
 pub(super) fn fit(
     scene: &Scene,
     spec: &FitSpec,
-    built: &Built,
+    prepared: &Prepared,
     Clip { recording, frames, .. }: &Clip,
     run: &Run,
     flags: &Flags,
     work: &mut Work,
 ) -> Result<Tally> {
+    let built = &prepared.built;
     let model = &built.model;
     let probes = probes(scene, built);
     let mut fit = Fit::new(model, scene, spec, recording)?;
     let names: Vec<String> = fit.markers().iter().map(|m| m.name.clone()).collect();
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, true)?;
+    let ranges = scene.control_ranges();
+    let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
+    let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
+    let mut estimates = Estimates::new(prepared, settings(scene), placed)?;
     let mut meter = Meter::new(flags, frames.len());
     let mut tally = Tally::default();
     let mut fitted = Vec::new();
@@ -56,6 +62,8 @@ pub(super) fn fit(
                     fit.work().linear.factorisations - before
                 ));
                 tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
+                let warning = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
+                tally.warn(frame, warning.into_iter().collect(), &mut meter, flags);
                 fitted.push(FittedFrame {
                     frame,
                     values: estimate.equilibrium.state.controls.clone(),
@@ -73,9 +81,7 @@ pub(super) fn fit(
     }
     meter.finish();
     *work = fit.work();
-    record.finish(work)?;
-    let ranges = scene.control_ranges();
-    let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
+    record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
     let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
     let summary = FitSummary {
         name: &scene.name,
@@ -84,6 +90,7 @@ pub(super) fn fit(
         frames: &fitted,
         frames_failed: tally.failed.len(),
         errors: &errors,
+        mesh_errors: &estimates.errors,
         iterations: work.iterations,
         seconds: run.start.elapsed().as_secs_f64(),
         folder: &run.folder.path().display().to_string(),

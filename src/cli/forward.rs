@@ -1,7 +1,9 @@
 //! Task `forward`: equilibria for given activations, one after the other in time.
 
 use super::Flags;
+use super::estimate::{Estimates, of_probes};
 use super::noticed::noticed;
+use super::prepare::Prepared;
 use super::progress::Meter;
 use super::run::{Run, Tally};
 use super::terminal::print;
@@ -16,7 +18,14 @@ use crate::report::{FailedFrame, Frame, Probe, Record, bone_states, muscle_state
 use crate::scene::Scene;
 
 /// Solves every frame, writes it, prints the page.
-pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, work: &mut Work) -> Result<Tally> {
+pub(super) fn forward(
+    scene: &Scene,
+    prepared: &Prepared,
+    run: &Run,
+    flags: &Flags,
+    work: &mut Work,
+) -> Result<Tally> {
+    let built = &prepared.built;
     let model = &built.model;
     let probes = probes(scene, built);
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, false)?;
@@ -64,9 +73,14 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
         }
         run.write_running(&tally)?;
     }
+    let mut estimates = Estimates::new(prepared, settings(scene), of_probes(&probes))?;
+    if let Some((frame, found)) = &last {
+        let warning = estimates.forward(*frame, &found.state, &mut record)?;
+        tally.warn(*frame, warning.into_iter().collect(), &mut meter, flags);
+    }
     meter.finish();
     *work = solver.work();
-    record.finish(work)?;
+    record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
     if let Some((frame, found)) = &last {
         let x = model.current(&found.state);
         let summary = ForwardSummary {
@@ -81,6 +95,7 @@ pub(super) fn forward(scene: &Scene, built: &Built, run: &Run, flags: &Flags, wo
             external_work: model.external_work(&found.state),
             reactions: &model.supports().rotation_reactions(model.mesh(), &found.evaluation.force, &x),
             det_f: found.evaluation.det_f,
+            mesh_errors: &estimates.errors,
             iterations: work.iterations,
             seconds: run.start.elapsed().as_secs_f64(),
             folder: &run.folder.path().display().to_string(),

@@ -5,6 +5,7 @@
 
 mod check;
 pub mod diagnostics;
+mod estimate;
 mod fit;
 mod forward;
 mod inspect;
@@ -76,6 +77,9 @@ struct Flags {
     /// Use the cheapest settings of accuracy.toml beside the problem whose error is at most this, for example 0.1mm
     #[arg(long, global = true, value_name = "MM", value_parser = millimetres)]
     accuracy: Option<f64>,
+    /// Estimate the error of the mesh, like --set output.estimate=true
+    #[arg(long, global = true)]
+    estimate: bool,
     /// Stop before the first solve
     #[arg(long, global = true)]
     dry_run: bool,
@@ -118,6 +122,12 @@ impl Flags {
             When::Never => Colour::Never,
         };
         when.on()
+    }
+
+    /// What is set in the problem.
+    fn set(&self) -> Vec<String> {
+        let estimate = self.estimate.then(|| "output.estimate=true".to_owned());
+        self.set.iter().cloned().chain(estimate).collect()
     }
 
     /// Under `--strict` a warning is an error, which `-q` does not hide.

@@ -6,6 +6,7 @@ use crate::fit::placement::{Marker, check_units, place};
 use crate::fit::recording::chosen_frames;
 use crate::markers::Recording;
 use crate::model::build::{Built, build, host};
+use crate::model::halved::Halved;
 use crate::scene::{FitSpec, Scene, Task};
 
 /// A problem that can be solved.
@@ -13,6 +14,8 @@ pub(super) struct Prepared {
     pub built: Built,
     /// Present where the task is a fit.
     pub clip: Option<Clip>,
+    /// The same on halved elements, where an estimate of the error is asked for and can be had.
+    pub halved: Option<Halved>,
     pub warnings: Vec<Warning>,
 }
 
@@ -40,7 +43,9 @@ pub(super) fn prepare(source: &Source) -> Result<Prepared> {
             let mut warnings = scene.warnings.clone();
             warnings.extend(built.warnings.iter().cloned());
             warnings.extend(clip.iter().flat_map(|clip| recording_warnings(&clip.recording)));
-            Ok(Prepared { built, clip, warnings })
+            let halved = scene.output.estimate.then(|| Halved::new(scene, &built.model));
+            let halved = halved.and_then(|halved| halved.map_err(|warning| warnings.push(*warning)).ok());
+            Ok(Prepared { built, clip, halved, warnings })
         }
         (built, clip) => {
             let mistakes = [built.err(), clip.err()].into_iter().flatten();

@@ -29,11 +29,11 @@ impl Source {
         match path {
             Some(path) => {
                 let chosen = flags.accuracy.map(|target| chosen(path, target, flags)).transpose()?;
-                let set = [&chosen.unwrap_or_default()[..], &flags.set].concat();
+                let set = [&chosen.unwrap_or_default()[..], &flags.set()].concat();
                 Ok(Source { scene: Scene::read(path, &set)?, built_in: false })
             }
             None => {
-                let mut scene = Scene::parse(PROBLEM, NAME, Path::new(""), &flags.set)?;
+                let mut scene = Scene::parse(PROBLEM, NAME, Path::new(""), &flags.set())?;
                 "beam".clone_into(&mut scene.name);
                 Ok(Source { scene, built_in: true })
             }

@@ -1,7 +1,7 @@
 //! `risorius run [problem.toml]`: does what the problem's task says, and leaves a run folder.
 
 use super::check::describe;
-use super::prepare::{Clip, Prepared, prepare};
+use super::prepare::{Prepared, prepare};
 use super::problem::Source;
 use super::progress::Meter;
 use super::terminal::tell;
@@ -10,10 +10,9 @@ use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
 use crate::model::Model;
-use crate::model::build::Built;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
-use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Task};
+use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -73,20 +72,22 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     if let Some(path) = path
         && let Problem::Study(study) = Problem::read(path, &flags.set)?
     {
+        let study = Study { estimate: study.estimate || flags.estimate, ..*study };
         return study::run(&study, path, flags);
     }
     let start = Instant::now();
     let mut source = Source::read(path, flags)?;
     // the recording is read before anything is written: a mistake in it leaves no folder behind
-    let Prepared { built, clip, warnings } = prepare(&source)?;
-    flags.warn(&warnings);
+    let prepared = prepare(&source)?;
+    let Prepared { built, halved, warnings, .. } = &prepared;
+    flags.warn(warnings);
     if flags.strict && !warnings.is_empty() {
         let noun = if warnings.len() == 1 { "warning" } else { "warnings" };
         tell(&format!("error: {} {noun} under --strict, nothing was run\n", warnings.len()));
         return Ok(Ending::Warned);
     }
     if !flags.quiet {
-        tell(&describe(&source.scene, &built.model));
+        tell(&describe(&source.scene, &built.model, halved.as_ref()));
     }
     if flags.dry_run {
         return Ok(Ending::Ok);
@@ -103,21 +104,14 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     run.write_running(&Tally::default())?;
 
     let mut work = Work::default();
-    let outcome = task(&source, &built, clip.as_ref(), &run, flags, &mut work);
+    let outcome = task(&source, &prepared, &run, flags, &mut work);
     finish(&run, Some(&built.model), &work, outcome, flags.strict)
 }
 
-fn task(
-    source: &Source,
-    built: &Built,
-    clip: Option<&Clip>,
-    run: &Run,
-    flags: &Flags,
-    work: &mut Work,
-) -> Result<Tally> {
-    match (clip, &source.scene.fit) {
-        (Some(clip), Some(spec)) => fit::fit(&source.scene, spec, built, clip, run, flags, work),
-        _ => forward::forward(&source.scene, built, run, flags, work),
+fn task(source: &Source, prepared: &Prepared, run: &Run, flags: &Flags, work: &mut Work) -> Result<Tally> {
+    match (&prepared.clip, &source.scene.fit) {
+        (Some(clip), Some(spec)) => fit::fit(&source.scene, spec, prepared, clip, run, flags, work),
+        _ => forward::forward(&source.scene, prepared, run, flags, work),
     }
 }
 

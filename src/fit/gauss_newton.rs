@@ -202,7 +202,10 @@ where
 }
 
 fn is_not_converged(error: &ArgminError) -> bool {
-    matches!(error.downcast_ref::<Error>(), Some(Error::NotConverged { .. } | Error::Singular { .. }))
+    matches!(
+        error.downcast_ref::<Error>(),
+        Some(Error::NotConverged { .. } | Error::GapNotClosed { .. } | Error::Singular { .. })
+    )
 }
 
 /// 1/2 |r|^2

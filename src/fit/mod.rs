@@ -7,6 +7,7 @@
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
 //! ([`sensitivity`]). Frames follow each other warm ([`sequence`]); [`covariance`] says how far an answer can be believed.
 
+pub mod bias;
 pub mod bounded_step;
 pub mod covariance;
 pub mod frame;

@@ -46,7 +46,9 @@ pub fn sensitivities(
         Sensitivity::Tangent => solver.rates(&at.state, unknowns),
         Sensitivity::FiniteDifference { step } => {
             let settings = solver.settings();
-            solver.set_settings(Settings { tolerance: TIGHTER * settings.tolerance, ..settings });
+            // a neighbour must be one: on the same branch, stable or not
+            let tolerance = TIGHTER * settings.tolerance;
+            solver.set_settings(Settings { tolerance, release: false, ..settings });
             let found = unknowns.iter().map(|control| difference(solver, at, *control, step)).collect();
             solver.set_settings(settings);
             found

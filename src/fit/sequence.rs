@@ -73,6 +73,9 @@ pub struct Estimate {
     pub max_mm: f64,
     /// Gauss-Newton iterations.
     pub iterations: Vec<FitIteration>,
+    /// d(weighted residual)/d(control) at the equilibrium: three rows for every marker that was measured, a column for every
+    /// control that is sought.
+    pub jacobian: DMatrix<f64>,
 }
 
 impl<'m> Fit<'m> {
@@ -85,7 +88,7 @@ impl<'m> Fit<'m> {
         check_units(&markers, model.mesh(), recording, fit)?;
         let settings = Settings { release: false, ..settings(scene) };
         let mut solver = Solver::new(model, settings)?;
-        let unknowns: Vec<usize> = fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect();
+        let unknowns = sought(fit, model);
         let mut held = vec![0.0; model.controls().len()];
         let mut held_curves = Vec::new();
         let ranges = scene.control_ranges();
@@ -182,6 +185,7 @@ impl<'m> Fit<'m> {
             positions_mm,
             measured_mm,
             iterations: optimum.iterations,
+            jacobian: optimum.jacobian,
         })
     }
 
@@ -292,6 +296,11 @@ fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
         }
     }
     held
+}
+
+/// The controls that a fit seeks, in its order.
+pub fn sought(fit: &FitSpec, model: &Model) -> Vec<usize> {
+    fit.unknowns.iter().flat_map(|name| model.controls_of(name)).collect()
 }
 
 /// The solver settings of a scene.

@@ -172,6 +172,20 @@ impl<'m> Balance<'m> {
         Ok(rhs)
     }
 
+    /// One undamped Newton step from a state with all prescribed motion done, with constraints as open or closed as they
+    /// are: K d + B^T z = - r, B d = 0. `None` where it does not lower the residual.
+    pub fn corrected(&mut self, state: &State) -> Result<Option<State>> {
+        let before = self.evaluate(state, Want::Force, None).residual;
+        let mut step: Vec<f64> = before.iter().map(|r| -r).collect();
+        self.solve_held(state, &mut step, vec![None])?;
+        let mut next = state.clone();
+        self.model.advance(&mut next, &step, 1.0);
+        let after = self.evaluate(&next, Want::Force, None);
+        self.work.iterations += 1;
+        let lower = after.det_f.min > 0.0 && self.norm(&after.residual) <= self.norm(&before);
+        Ok(lower.then_some(next))
+    }
+
     /// Factorises the tangent at a state, to see its negative modes.
     pub fn inspect(&mut self, state: &State) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);

@@ -2,6 +2,7 @@
 
 mod balance;
 pub mod drives;
+pub mod estimate;
 mod release;
 mod work;
 
@@ -473,6 +474,29 @@ impl<'m> Solver<'m> {
     /// Where the tangent cannot be factorised, or the refined solution does not reach 1e-9.
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
         self.balance.solve_with_tangent(state, rhs, columns)
+    }
+
+    /// The state after one Newton step from `state`, in which all prescribed motion is done: what a state that is near an
+    /// equilibrium lacks, to first order. Where the step does not lower the residual, `state` is not near, and the
+    /// equilibrium is sought from there, with damped steps and if need be by letting the body go.
+    ///
+    /// # Errors
+    /// As [`Solver::solve_with_tangent`]; no equilibrium.
+    pub fn corrected(&mut self, state: &State) -> Result<State> {
+        if let Some(corrected) = self.balance.corrected(state)? {
+            return Ok(corrected);
+        }
+        self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });
+        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        let outcome = self.solve(state.clone(), limits)?;
+        let found = match outcome.stop {
+            None => outcome.state,
+            Some(stop) => match self.release(&[], state, state) {
+                Some(released) => released.state,
+                None => return Err(self.not_converged(&Stepper::at_end(), stop, &outcome)),
+            },
+        };
+        Ok(self.close_gaps(found, Vec::new(), Vec::new())?.state)
     }
 
     /// d(unknowns)/d(control) at the equilibrium `state` by the implicit function theorem, for each of `controls`.

@@ -7,6 +7,7 @@ pub mod element;
 pub mod exf;
 pub mod face;
 pub mod fibre_angles;
+pub mod halved;
 pub mod join;
 pub mod location;
 pub mod map;

@@ -4,6 +4,7 @@ mod assembly;
 mod bones;
 pub mod build;
 mod constraints;
+pub mod halved;
 mod numbering;
 mod signs;
 mod state;

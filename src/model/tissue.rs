@@ -76,6 +76,19 @@ fn bad(region: &RegionSpec, problem: String, help: &'static str) -> Error {
     Error::BadRegion { region: name, problem, help, place: Box::new(region.place.clone()) }
 }
 
+/// The elements of a part of the host.
+pub(super) fn elements(part: &PartSpec, mesh: &Mesh) -> Vec<usize> {
+    match part {
+        PartSpec::Elements(elements) => elements.clone(),
+        PartSpec::Box([lower, upper]) => (0..mesh.elements())
+            .filter(|element| {
+                let centre = mesh.position(MaterialPoint { element: *element, xi: [0.5; 3] });
+                (0..3).all(|d| (lower[d]..=upper[d]).contains(&centre[d]))
+            })
+            .collect(),
+    }
+}
+
 /// The elements of each region.
 fn parts(regions: &[RegionSpec], mesh: &Mesh) -> Result<Vec<Vec<usize>>> {
     let mut mistakes = Vec::new();
@@ -83,15 +96,7 @@ fn parts(regions: &[RegionSpec], mesh: &Mesh) -> Result<Vec<Vec<usize>>> {
     let mut parts = Vec::with_capacity(regions.len());
     for (index, region) in regions.iter().enumerate() {
         let mistake = |problem: String, help: &'static str| bad(region, problem, help);
-        let elements: Vec<usize> = match &region.part {
-            PartSpec::Elements(elements) => elements.clone(),
-            PartSpec::Box([lower, upper]) => (0..mesh.elements())
-                .filter(|element| {
-                    let centre = mesh.position(MaterialPoint { element: *element, xi: [0.5; 3] });
-                    (0..3).all(|d| (lower[d]..=upper[d]).contains(&centre[d]))
-                })
-                .collect(),
-        };
+        let elements = elements(&region.part, mesh);
         if elements.is_empty() {
             let help = "give the lower corner first, and a box that holds the centre of an element";
             mistakes.push(mistake("holds the centre of no element".into(), help));

@@ -58,6 +58,19 @@ impl MarkerPair<'_> {
     }
 }
 
+/// Estimated errors of the mesh in a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshError {
+    /// What the points are: `probe` or `marker`.
+    pub kind: &'static str,
+    /// The largest error at a corner of a halved element, mm.
+    pub largest_mm: f64,
+    /// Of every point its name and error, mm.
+    pub points: Vec<(String, f64)>,
+    /// Of every control that was fitted its name and what it is too great by: see [`bias`](crate::fit::bias::bias).
+    pub biases: Vec<(String, Option<f64>)>,
+}
+
 /// A muscle at a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MuscleState<'a> {

@@ -27,8 +27,8 @@ pub mod view;
 pub mod vtu;
 
 pub use frame::{
-    BoneState, ContactState, Frame, MarkerPair, MuscleState, Probe, ProbeState, bone_states, contact_states,
-    muscle_states, probe_states,
+    BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Probe, ProbeState, bone_states,
+    contact_states, muscle_states, probe_states,
 };
 pub use manifest::{Input, Manifest};
 pub use record::Record;

@@ -1,10 +1,10 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
-use super::frame::{Frame, MarkerPair, Probe, bone_states, contact_states, muscle_states, probe_states};
+use super::frame::{Frame, MarkerPair, MeshError, Probe, bone_states, contact_states, muscle_states, probe_states};
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, FitTable, MarkerTable, MuscleTable,
-    ProbeTable, write_cost,
+    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable, MarkerTable,
+    MuscleTable, ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
@@ -29,6 +29,7 @@ pub struct Record<'a> {
     contacts: Option<ContactTable>,
     fit: Option<(MarkerTable, FitTable)>,
     probe_table: Option<ProbeTable>,
+    estimates: Option<EstimateTable>,
     view: View,
     frames: usize,
     /// Time spent in writing, s.
@@ -61,6 +62,7 @@ impl<'a> Record<'a> {
             contacts: model.contacts().next().map(|_| ContactTable::create(run)).transpose()?,
             fit: if fitted { Some((MarkerTable::create(run)?, FitTable::create(run)?)) } else { None },
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
+            estimates: None,
             view: View::new(run),
             frames: 0,
             seconds: 0.0,
@@ -108,6 +110,17 @@ impl<'a> Record<'a> {
         Ok(())
     }
 
+    /// Writes the estimated errors of a frame.
+    ///
+    /// # Errors
+    /// Where they cannot be written.
+    pub fn estimate(&mut self, frame: Frame, error: &MeshError) -> Result<()> {
+        if self.estimates.is_none() {
+            self.estimates = Some(EstimateTable::create(self.run)?);
+        }
+        self.estimates.as_mut().map_or(Ok(()), |table| table.add(frame, error))
+    }
+
     /// Writes the last equilibrium on the way to a frame that failed, the iterate at which it failed, and how Newton's method
     /// came there; returns the paths of the two states.
     ///
@@ -119,11 +132,11 @@ impl<'a> Record<'a> {
         Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }
 
-    /// Writes the table of costs.
+    /// Writes the table of costs; `estimate` is the work and the seconds of estimates.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn finish(&self, work: &Work) -> Result<()> {
-        write_cost(self.run, self.model, work, self.seconds)
+    pub fn finish(&self, work: &Work, estimate: Option<(&Work, f64)>) -> Result<()> {
+        write_cost(self.run, self.model, work, self.seconds, estimate)
     }
 }

@@ -84,7 +84,7 @@ impl Default for SolverSpec {
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        OutputSpec { view: true, every: 1 }
+        OutputSpec { view: true, every: 1, estimate: false }
     }
 }
 
@@ -552,5 +552,6 @@ fn output(table: &mut Table) -> Option<OutputSpec> {
     let default = OutputSpec::default();
     let view = table.or("view", default.view, |item| item.flag());
     let every = table.or("every", default.every, |item| item.whole(1, 1_000_000));
-    Some(OutputSpec { view: view?, every: every? })
+    let estimate = table.or("estimate", default.estimate, |item| item.flag());
+    Some(OutputSpec { view: view?, every: every?, estimate: estimate? })
 }

@@ -101,7 +101,7 @@ impl Scene {
             lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
         }
         let SolverSpec { tolerance, max_iterations, step_max, step_min } = *solver;
-        let OutputSpec { view, every } = output;
+        let OutputSpec { view, every, estimate } = output;
         lines.extend([
             "\n[solver]".into(),
             format!("tolerance = {}", number(tolerance)),
@@ -111,6 +111,7 @@ impl Scene {
             "\n[output]".into(),
             format!("view = {view}"),
             format!("every = {every}"),
+            format!("estimate = {estimate}"),
         ]);
         lines.join("\n") + "\n"
     }

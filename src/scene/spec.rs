@@ -811,4 +811,6 @@ pub struct OutputSpec {
     pub view: bool,
     /// Every how many frames a shape is written, at least 1.
     pub every: usize,
+    /// Whether the discretisation error is estimated: of the last frame of a forward run, of every frame of a fit.
+    pub estimate: bool,
 }

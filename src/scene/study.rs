@@ -25,6 +25,8 @@ pub struct Study {
     pub measure: Measure,
     /// Timed solves of each variant after a first one that is not timed.
     pub repetitions: usize,
+    /// Whether every variant estimates its own error too.
+    pub estimate: bool,
     /// The error for which a setting is asked, in the unit of the measure.
     pub target: Option<f64>,
     /// The table in the file.
@@ -193,6 +195,7 @@ fn body(table: &mut Table, folder: &Path) -> Option<Study> {
     let measures = Measure::ALL.map(|measure| (measure.word(), measure));
     let measure = table.or("measure", Measure::Probes, |item| item.choice(&measures, &[]));
     let repetitions = table.or("repetitions", 3, |item| item.whole(1, 1000));
+    let estimate = table.or("estimate", false, |item| item.flag());
     let target = table.optional("target", |item| item.number(POSITIVE));
     let (factors, variants) = (factors?, variants?);
     if factors.is_empty() && variants.is_empty() {
@@ -207,6 +210,7 @@ fn body(table: &mut Table, folder: &Path) -> Option<Study> {
         reference: reference?,
         measure: measure?,
         repetitions: repetitions?,
+        estimate: estimate?,
         target: target?,
         place: table.place(),
     })

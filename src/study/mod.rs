@@ -7,6 +7,7 @@
 //! A variant that fails is listed with its code. Seconds come with counts of work, because a machine is noisy and counts
 //! are not.
 
+pub mod estimate;
 pub mod front;
 pub mod norms;
 pub mod order;
@@ -15,6 +16,7 @@ pub mod sweep;
 pub mod timing;
 pub mod variants;
 
+pub use estimate::Estimated;
 pub use norms::Errors;
 pub use solution::{Prepared, Solution};
 pub use sweep::{Outcome, Solved, Sweep, VariantResult};

@@ -6,12 +6,12 @@
 //! of the last frame. Probes, markers and activations are compared in all frames.
 
 use super::solution::{Prepared, Solution};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::quadrature::GaussRule;
 use crate::math::tensor::{Matrix, Vector, determinant, inverse, norm, subtract};
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh, position_and_jacobian};
-use crate::model::State;
+use crate::model::{Evaluation, Model, State};
 use crate::scene::{Curves, Measure};
 use rayon::prelude::*;
 use std::path::Path;
@@ -29,48 +29,74 @@ impl Errors {
         self.0[measure as usize]
     }
 
-    fn set(&mut self, measure: Measure, value: f64) {
+    /// All of them times a factor.
+    pub(super) fn scaled(self, factor: f64) -> Errors {
+        Errors(self.0.map(|error| error.map(|error| factor * error)))
+    }
+
+    pub(super) fn set(&mut self, measure: Measure, value: f64) {
         self.0[measure as usize] = value.is_finite().then_some(value);
     }
 }
 
+/// Frames of a model, and the material points that are looked at.
+pub struct Seen<'a> {
+    /// The model.
+    pub model: &'a Model,
+    /// Places of the probes.
+    pub probes: &'a [MaterialPoint],
+    /// Places of the markers.
+    pub markers: &'a [MaterialPoint],
+    /// The state of every frame.
+    pub states: Vec<&'a State>,
+    /// The evaluation of the last one.
+    pub last: Option<&'a Evaluation>,
+}
+
 /// Against another solution of the same frames.
 pub fn against_solution(own: (&Prepared, &Solution), reference: (&Prepared, &Solution)) -> Errors {
-    let mut errors = Errors::default();
     let ((problem, found), (best, known)) = (own, reference);
-    let pairs = || found.frames.iter().zip(&known.frames).map(|(a, b)| (&a.state, &b.state));
-    let (mesh, best_mesh) = (problem.built.model.mesh(), best.built.model.mesh());
+    between(&found.seen(problem, &found.points()), &known.seen(best, &known.points()))
+}
+
+/// Against better states of the same frames.
+pub fn between(found: &Seen<'_>, best: &Seen<'_>) -> Errors {
+    let mut errors = Errors::default();
+    let pairs = || found.states.iter().copied().zip(best.states.iter().copied());
+    let (mesh, best_mesh) = (found.model.mesh(), best.model.mesh());
     let displaced = |mesh: &Mesh, at: MaterialPoint, state: &State| mesh.interpolate(at, &state.u);
     let distance = |a: MaterialPoint, b: MaterialPoint, (own, known): (&State, &State)| {
         norm(subtract(displaced(mesh, a, own), displaced(best_mesh, b, known)))
     };
-    let probes = problem.built.probes.iter().zip(&best.built.probes);
-    if problem.built.probes.len() == best.built.probes.len() && !problem.built.probes.is_empty() {
+    let probes = found.probes.iter().zip(best.probes);
+    if found.probes.len() == best.probes.len() && !found.probes.is_empty() {
         let of_probe = |(a, b): (&MaterialPoint, &MaterialPoint)| {
             pairs().map(|states| distance(*a, *b, states)).fold(0.0, f64::max)
         };
         errors.set(Measure::Probes, probes.map(of_probe).fold(0.0, f64::max));
     }
-    if !found.markers.is_empty() && found.markers.len() == known.markers.len() {
+    if !found.markers.is_empty() && found.markers.len() == best.markers.len() {
         let squares =
-            found.markers.iter().zip(&known.markers).flat_map(|(a, b)| pairs().map(|s| distance(*a, *b, s).powi(2)));
+            found.markers.iter().zip(best.markers).flat_map(|(a, b)| pairs().map(|s| distance(*a, *b, s).powi(2)));
         errors.set(Measure::Markers, root_mean(squares));
         errors.set(
             Measure::Activations,
             root_mean(pairs().flat_map(|(a, b)| squares_between(&a.controls, &b.controls))),
         );
     }
-    if let (Some(own), Some(known)) = (found.frames.last(), known.frames.last()) {
-        if let Some([displacement, gradient, det_f]) = fields(mesh, &own.state, best_mesh, &known.state) {
+    if let (Some(own), Some(known)) = (found.states.last(), best.states.last()) {
+        if let Some([displacement, gradient, det_f]) = fields(mesh, own, best_mesh, known) {
             errors.set(Measure::Displacement, displacement);
             errors.set(Measure::Gradient, gradient);
             errors.set(Measure::DetF, det_f);
         }
-        let stored = |prepared: &Prepared, energies: &[f64]| -> f64 {
-            prepared.built.model.terms().iter().zip(energies).filter(|(t, _)| !t.is_load()).map(|(_, e)| e).sum()
-        };
-        let known_energy = stored(best, &known.evaluation.energies);
-        errors.set(Measure::Energy, (stored(problem, &own.evaluation.energies) / known_energy - 1.0).abs());
+    }
+    let stored = |seen: &Seen<'_>| -> Option<f64> {
+        let terms = seen.model.terms().iter().zip(&seen.last?.energies);
+        Some(terms.filter(|(t, _)| !t.is_load()).map(|(_, e)| e).sum())
+    };
+    if let (Some(own), Some(known)) = (stored(found), stored(best)) {
+        errors.set(Measure::Energy, (own / known - 1.0).abs());
     }
     errors
 }
@@ -94,13 +120,16 @@ pub fn against_values(problem: &Prepared, found: &Solution, values: &[(String, f
     errors
 }
 
-/// Against known activations over time, a table `time_s,<control>,...`.
+/// Against known activations over time, a table `time_s,<control>,...`; other columns are passed over.
 ///
 /// # Errors
 /// A table that cannot be read.
 pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -> Result<Errors> {
     let names: Vec<&str> = problem.built.model.controls().iter().map(|c| c.name.as_str()).collect();
-    let truth = Curves::read(table, &problem.scene.control_ranges())?;
+    let text =
+        std::fs::read_to_string(table).map_err(|source| Error::Io { action: "read", path: table.into(), source })?;
+    let truth =
+        Curves::parse(&known_columns(&text, &names), &table.display().to_string(), &problem.scene.control_ranges())?;
     let squares = found.frames.iter().zip(&found.times_s).flat_map(|(frame, time_s)| {
         let known = names.iter().zip(&frame.state.controls);
         known.filter_map(|(name, value)| Some((truth.at(name, *time_s)? - value).powi(2))).collect::<Vec<f64>>()
@@ -110,11 +139,23 @@ pub fn against_activations(problem: &Prepared, found: &Solution, table: &Path) -
     Ok(errors)
 }
 
+/// The columns `time_s` and `names` of a table.
+fn known_columns(text: &str, names: &[&str]) -> String {
+    let header: Vec<&str> = text.lines().next().unwrap_or_default().split(',').collect();
+    let keep = |name: &&str| name.trim() == "time_s" || names.contains(&name.trim());
+    let kept: Vec<usize> = (0..header.len()).filter(|k| keep(&header[*k])).collect();
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        kept.iter().filter_map(|k| cells.get(*k).copied()).collect::<Vec<_>>().join(",") + "\n"
+    };
+    text.lines().map(row).collect()
+}
+
 fn squares_between<'a>(a: &'a [f64], b: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b))
 }
 
-fn root_mean(squares: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn root_mean(squares: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = squares.fold((0.0, 0), |(sum, count), s| (sum + s, count + 1));
     (sum / f64::from(count)).sqrt()
 }

@@ -1,9 +1,11 @@
 //! One solve of a problem in memory: what it found, in which time, with what work. Nothing is written.
 
+use super::norms::Seen;
 use crate::error::Result;
+use crate::fit::placement::Marker;
 use crate::fit::recording::{chosen_frames, read};
 use crate::fit::sequence::settings;
-use crate::fit::{Fit, placement};
+use crate::fit::{Estimate, Fit, placement};
 use crate::forward::drives::drives;
 use crate::forward::{Equilibrium, Solver, Work};
 use crate::markers::Recording;
@@ -31,12 +33,32 @@ pub struct Solution {
     pub frames: Vec<Equilibrium>,
     /// Time of every frame, s.
     pub times_s: Vec<f64>,
-    /// Places of the markers in the host, for the task fit.
-    pub markers: Vec<MaterialPoint>,
+    /// The markers, for the task fit.
+    pub markers: Vec<Marker>,
+    /// What was fitted in every frame, for the task fit.
+    pub fits: Vec<Estimate>,
     /// Wall time of the solve, s; reading and building are not in it.
     pub seconds: f64,
     /// Work done.
     pub work: Work,
+}
+
+impl Solution {
+    /// Places of the markers in the host.
+    pub fn points(&self) -> Vec<MaterialPoint> {
+        self.markers.iter().map(|marker| marker.point).collect()
+    }
+
+    /// As norms see it; `markers` are its [`Solution::points`].
+    pub(super) fn seen<'a>(&'a self, prepared: &'a Prepared, markers: &'a [MaterialPoint]) -> Seen<'a> {
+        Seen {
+            model: &prepared.built.model,
+            probes: &prepared.built.probes,
+            markers,
+            states: self.frames.iter().map(|frame| &frame.state).collect(),
+            last: self.frames.last().map(|frame| &frame.evaluation),
+        }
+    }
 }
 
 impl Prepared {
@@ -74,8 +96,9 @@ impl Prepared {
                 Ok(Solution {
                     seconds: start.elapsed().as_secs_f64(),
                     times_s: found.iter().map(|estimate| estimate.time_s).collect(),
-                    frames: found.into_iter().map(|estimate| estimate.equilibrium).collect(),
-                    markers: markers.iter().map(|marker| marker.point).collect(),
+                    frames: found.iter().map(|estimate| estimate.equilibrium.clone()).collect(),
+                    fits: found,
+                    markers,
                     work: fit.work(),
                 })
             }
@@ -97,6 +120,6 @@ impl Prepared {
         }
         let seconds = start.elapsed().as_secs_f64();
         let times_s = drives.iter().map(|(time_s, _)| *time_s).collect();
-        Ok(Solution { frames, times_s, markers: Vec::new(), seconds, work: solver.work() })
+        Ok(Solution { frames, times_s, markers: Vec::new(), fits: Vec::new(), seconds, work: solver.work() })
     }
 }

@@ -1,5 +1,6 @@
 //! All variants of a study, solved and timed.
 
+use super::estimate::{Estimated, estimate};
 use super::norms::{self, Errors};
 use super::solution::{Prepared, Solution};
 use super::timing::Timing;
@@ -42,6 +43,8 @@ pub struct Failed {
 pub struct Solved {
     /// Errors against the reference.
     pub errors: Errors,
+    /// Errors that it estimates of itself, if that is asked for, or why there are none.
+    pub estimate: Option<std::result::Result<Estimated, Failed>>,
     /// Wall times of the repetitions, s.
     pub timing: Timing,
     /// Wall time of building the model once, s.
@@ -168,13 +171,25 @@ impl<'s> Sweep<'s> {
                 Reference::Values(values) => norms::against_values(&prepared, &solution, values),
                 Reference::Activations(table) => norms::against_activations(&prepared, &solution, table)?,
             };
-            let solved = describe(&prepared, &solution, errors);
+            let own =
+                self.study.estimate.then(|| with_threads(&variant.change, || Ok(estimate(&prepared, &solution))));
+            let own = own.transpose()?.map(|own| {
+                own.map_err(|why| {
+                    let message = why.message.lines().next().unwrap_or_default().to_owned();
+                    Failed { code: why.code, message }
+                })
+            });
+            let solved = Solved { estimate: own, ..describe(&prepared, &solution, errors) };
             Ok((prepared, solved))
         };
-        solve().map_err(|error| Failed {
+        // of several mistakes the first
+        let first = |error: Error| error.into_mistakes().into_iter().next();
+        let failed = |error: Error| Failed {
             code: error.code(),
             message: error.to_string().lines().next().unwrap_or_default().to_owned(),
-        })
+        };
+        let unknown = || Failed { code: "-", message: String::new() };
+        solve().map_err(|error| first(error).map_or_else(unknown, failed))
     }
 }
 
@@ -188,6 +203,7 @@ fn describe(prepared: &Prepared, solution: &Solution, errors: Errors) -> Solved 
     };
     Solved {
         errors,
+        estimate: None,
         timing: Timing::new(Vec::new()),
         build_seconds: prepared.build_seconds,
         work: solution.work.clone(),

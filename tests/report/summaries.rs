@@ -4,7 +4,7 @@ use crate::model::{MUSCLES, model};
 use crate::support::{FRAME, solved, some_markers};
 use risorius::fit::covariance::Bound;
 use risorius::mesh::MaterialPoint;
-use risorius::report::summary::{FitSummary, FittedFrame, ForwardSummary, MarkerErrors};
+use risorius::report::summary::{FitSummary, FittedFrame, ForwardSummary, MarkerErrors, MeshErrors};
 use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
 
@@ -27,6 +27,7 @@ fn forward_summary_shows_the_last_frame() {
         external_work: model.external_work(&found.state),
         reactions: &[(12.5, -3.25)],
         det_f: found.evaluation.det_f,
+        mesh_errors: &MeshErrors::default(),
         iterations: work.iterations,
         seconds: 1.234,
         folder: "runs/bend-0001",
@@ -65,6 +66,7 @@ fn fit_summary_marks_bounds_and_the_worst_markers() {
         frames: &frames[..1],
         frames_failed: 0,
         errors: &errors,
+        mesh_errors: &MeshErrors::default(),
         iterations: 1,
         seconds: 2.0,
         folder: "runs/smile-0001",

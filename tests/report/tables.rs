@@ -117,11 +117,11 @@ fn tables_have_their_columns_and_every_bit() {
     let residual = numbers(&last[5..7]);
     assert!(last[2] == "1.0" && last[3] == "walked" && residual[0] <= residual[1], "{last:?}");
 
-    write_cost(&run, &model, &work, 0.5).expect("written");
+    write_cost(&run, &model, &work, 0.5, Some((&work, 0.25))).expect("written");
     let rows = table("cost");
     assert_eq!(rows[0], columns("part,seconds,clock,points,count,flops"));
     let parts: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
-    let solver = ["assembly", "factorisation", "solve", "output"];
+    let solver = ["assembly", "factorisation", "solve", "output", "estimate"];
     assert_eq!(parts, [&["tissue", MUSCLES[0], MUSCLES[1], "traction"][..], &solver].concat());
     let evaluations = work.force_evaluations + work.assemblies;
     assert_eq!(rows[1][3], (evaluations * 6 * 64).to_string());

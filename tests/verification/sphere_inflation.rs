@@ -123,8 +123,8 @@ fn the_radii_of_an_inflated_sphere_converge_to_the_closed_form() {
         for pair in errors.windows(2) {
             let order = (pair[0].1 / pair[1].1).ln() / (pair[1].0 / pair[0].0).ln();
             println!("order {order:.2}");
-            assert!(order > 2.8, "{what} radius: {errors:?}, order {order:.2}");
+            assert!(order > 2.5, "{what} radius: {errors:?}, order {order:.2}");
         }
-        assert!(errors[2].1 < 3e-5, "{what} radius: {errors:?}");
+        assert!(errors[2].1 < 5e-5, "{what} radius: {errors:?}");
     }
 }

@@ -112,7 +112,9 @@ pub fn slab_beam_of(how: Discretisation, slabs: &[(&str, [f64; 3], f64)], elemen
 
 /// The equilibrium from rest.
 pub fn solve(model: &Model, controls: &[f64], load: f64) -> Equilibrium {
-    let mut solver = Solver::new(model, Settings { tolerance: 1e-10, ..Settings::default() }).expect("memory");
+    // a closed form may be a saddle: a short bar under a dead force would rather turn over
+    let settings = Settings { tolerance: 1e-10, release: false, ..Settings::default() };
+    let mut solver = Solver::new(model, settings).expect("memory");
     solver
         .equilibrium(&model.rest(), &Drive { controls: controls.to_vec(), load })
         .unwrap_or_else(|failure| panic!("{}", failure.error))

@@ -58,6 +58,7 @@ pub fn page(study: &Study, outcome: &Outcome) -> String {
         };
     }
     text += "\n![error against time](error_time.svg)\n";
+    estimates(study, outcome, &mut text);
     orders(study, outcome, &mut text);
     advice(study, outcome, &pairs, &mut text);
     if outcome.interrupted {
@@ -80,6 +81,51 @@ fn describe(measure: Measure) -> &'static str {
 
 fn shown(error: f64) -> String {
     if error.is_nan() { String::new() } else { format!("{error:.2e}") }
+}
+
+/// Ratios of an estimate to the true error that count as good.
+const GOOD: std::ops::RangeInclusive<f64> = 1.0 / 3.0..=3.0;
+
+/// What the variants estimated of their own errors beside what the errors are.
+fn estimates(study: &Study, outcome: &Outcome, text: &mut String) {
+    if !study.estimate {
+        return;
+    }
+    let unit = study.measure.unit();
+    *text += &format!(
+        "\n## Estimated errors\n\nOne corrected solve on halved elements; its seconds hold the building of that model.\n\n\
+         | variant | estimate {unit} | true {unit} | ratio | seconds |\n|---|---|---|---|---|\n"
+    );
+    let mut ratios = Vec::new();
+    for VariantResult { variant, ending } in &outcome.variants {
+        let Ok(solved) = ending else { continue };
+        let _ = match &solved.estimate {
+            Some(Ok(own)) => {
+                let (estimate, known) = (own.errors.get(study.measure), solved.errors.get(study.measure));
+                let ratio = estimate.zip(known).map(|(estimate, known)| estimate / known);
+                ratios.extend(ratio);
+                writeln!(
+                    text,
+                    "| {} | {} | {} | {} | {:.3} |",
+                    variant.name,
+                    shown(estimate.unwrap_or(f64::NAN)),
+                    shown(known.unwrap_or(f64::NAN)),
+                    ratio.map(|ratio| format!("{ratio:.2}")).unwrap_or_default(),
+                    own.seconds
+                )
+            }
+            Some(Err(why)) => writeln!(text, "| {} | {} {} | | | |", variant.name, why.code, why.message),
+            None => Ok(()),
+        };
+    }
+    if !ratios.is_empty() {
+        let good = ratios.iter().filter(|ratio| GOOD.contains(*ratio)).count();
+        *text += &format!(
+            "\nWithin a factor of 3 of the true error: {good} of {} variants ({:.0} %).\n",
+            ratios.len(),
+            100.0 * good as f64 / ratios.len() as f64
+        );
+    }
 }
 
 /// Observed orders beside theory, and what the probes converge to.

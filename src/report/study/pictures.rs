@@ -22,13 +22,14 @@ const COLOURS: [RGBColor; 7] = [
 /// More variants than this are not all numbered.
 const MOST_NUMBERED: usize = 16;
 
+/// Draws a picture into a text; leaves it empty where there is nothing to show.
+type Draw = fn(&Study, &Outcome, &mut String) -> Drawn;
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// Every picture with its file name; one that has nothing to show is left out.
 pub(super) fn all(study: &Study, outcome: &Outcome) -> Vec<(&'static str, String)> {
-    let pictures: [(&str, fn(&Study, &Outcome, &mut String) -> Drawn); 3] =
-        [("error_time.svg", error_time), ("order.svg", order), ("cost.svg", cost)];
-    let drawn = |(name, draw): (&'static str, fn(&Study, &Outcome, &mut String) -> Drawn)| {
+    let pictures: [(&str, Draw); 3] = [("error_time.svg", error_time), ("order.svg", order), ("cost.svg", cost)];
+    let drawn = |(name, draw): (&'static str, Draw)| {
         let mut text = String::new();
         // drawing into a string fails only where there is nothing to draw
         draw(study, outcome, &mut text).ok().filter(|()| !text.is_empty()).map(|()| (name, text))

@@ -15,7 +15,11 @@ pub(super) fn variants(study: &Study, outcome: &Outcome) -> String {
     let mut header: Vec<String> = vec!["variant".into()];
     header.extend(study.factors.iter().map(|factor| factor.name.clone()));
     header.extend(["status".into(), "code".into()]);
-    header.extend(measures.iter().map(|m| column(*m)));
+    header.extend(measures.iter().map(|m| column("error", *m)));
+    if study.estimate {
+        header.extend(measures.iter().map(|m| column("estimate", *m)));
+        header.push("estimate_seconds".into());
+    }
     header.extend(
         "seconds_median,seconds_min,seconds_max,repetitions_disturbed,build_seconds,elements,unknowns,newton_iterations,\
          force_evaluations,assemblies,points,factorisations,factor_flops,factor_gflop_s,solves,memory_mb,on_front"
@@ -38,6 +42,11 @@ pub(super) fn variants(study: &Study, outcome: &Outcome) -> String {
             Ok(solved) => {
                 row.extend([Cell::Text("solved"), Cell::Empty]);
                 row.extend(measures.iter().map(|m| solved.errors.get(*m).map_or(Cell::Empty, Cell::Number)));
+                if study.estimate {
+                    let own = solved.estimate.as_ref().and_then(|own| own.as_ref().ok());
+                    row.extend(measures.iter().map(|m| Cell::from(own.and_then(|own| own.errors.get(*m)))));
+                    row.push(own.map(|own| own.seconds).into());
+                }
                 row.extend(costs(solved));
                 row.push(Cell::Count(usize::from(on_front.contains(&index))));
             }
@@ -167,10 +176,10 @@ pub(super) fn applies(outcome: &Outcome, measure: Measure) -> bool {
 }
 
 /// `error_probes_mm` and so on.
-fn column(measure: Measure) -> String {
+fn column(what: &str, measure: Measure) -> String {
     let unit = match measure.unit() {
         "" => String::new(),
         unit => format!("_{unit}"),
     };
-    format!("error_{}{unit}", measure.word().replace('-', "_"))
+    format!("{what}_{}{unit}", measure.word().replace('-', "_"))
 }

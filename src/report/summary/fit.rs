@@ -1,7 +1,6 @@
 //! The page of a fit.
 
-use super::marker_errors::MarkerErrors;
-use super::{columns, count, optional};
+use super::{MarkerErrors, MeshErrors, columns, count, optional};
 use crate::fit::covariance::Bound;
 use crate::report::frame::Frame;
 use std::fmt;
@@ -37,6 +36,8 @@ pub struct FitSummary<'a> {
     pub frames_failed: usize,
     /// Distances of the markers.
     pub errors: &'a MarkerErrors,
+    /// What was estimated of the mesh's error.
+    pub mesh_errors: &'a MeshErrors,
     /// Newton iterations of all frames.
     pub iterations: usize,
     /// Wall time, s.
@@ -64,6 +65,7 @@ impl fmt::Display for FitSummary<'_> {
             frames => self.of_clip(frames, out)?,
         }
         self.of_markers(out)?;
+        write!(out, "{}", self.mesh_errors)?;
         let folder = self.folder;
         writeln!(out, "\nnext: shapes and residuals in {folder}/view/result.pvd and markers.pvd (ParaView)")?;
         writeln!(out, "      numbers in {folder}/tables/activations.csv and markers.csv")

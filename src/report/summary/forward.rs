@@ -1,6 +1,6 @@
 //! The page of a forward run.
 
-use super::{columns, count, optional};
+use super::{MeshErrors, columns, count, optional};
 use crate::model::WorstPoint;
 use crate::report::frame::{BoneState, Frame, MuscleState, ProbeState};
 use std::fmt;
@@ -30,6 +30,8 @@ pub struct ForwardSummary<'a> {
     pub reactions: &'a [(f64, f64)],
     /// Range of det F.
     pub det_f: WorstPoint,
+    /// What was estimated of the mesh's error.
+    pub mesh_errors: &'a MeshErrors,
     /// Newton iterations of all frames.
     pub iterations: usize,
     /// Wall time, s.
@@ -82,6 +84,7 @@ impl fmt::Display for ForwardSummary<'_> {
             writeln!(out, "  rotation {number}: torque {torque:.4} mN mm, axial force {axial:.4} mN")?;
         }
         writeln!(out, "  det F {:.4} to {:.4} (smallest in element {})", det_f.min, det_f.max, det_f.element)?;
+        write!(out, "{}", self.mesh_errors)?;
         writeln!(out, "\nnext: tables in {0}/tables, shapes in {0}/view/result.pvd (ParaView)", self.folder)
     }
 }

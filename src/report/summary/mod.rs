@@ -3,10 +3,12 @@
 mod fit;
 mod forward;
 mod marker_errors;
+mod mesh_errors;
 
 pub use fit::{FitSummary, FittedFrame};
 pub use forward::ForwardSummary;
 pub use marker_errors::{ErrorsOf, MarkerErrors};
+pub use mesh_errors::MeshErrors;
 
 /// Lines of a table: the first column to the left, the others to the right, two blanks between, two in front. No lines
 /// where there are no rows.

@@ -8,11 +8,18 @@ use crate::report::run_folder::RunFolder;
 
 /// Writes the table `part,seconds,clock,points,count,flops`: a row per effect that the scene named (seconds summed over
 /// `threads`, quadrature points evaluated), then rows on the `wall` clock for `assembly` (evaluations, which hold the
-/// effects, and assemblies), `factorisation`, `solve` and `output`.
+/// effects, and assemblies), `factorisation`, `solve` and `output`, and for `estimate`, the whole of what estimates of the error took, if
+/// there were any: its work and seconds.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
-pub fn write_cost(run: &RunFolder, model: &Model, work: &Work, output_seconds: f64) -> Result<()> {
+pub fn write_cost(
+    run: &RunFolder,
+    model: &Model,
+    work: &Work,
+    output_seconds: f64,
+    estimate: Option<(&Work, f64)>,
+) -> Result<()> {
     let mut rows = Rows::default();
     rows.add("part,seconds,clock,points,count,flops".split(',').map(Cell::Text));
     for ((term, seconds), points) in model.terms().iter().zip(&work.term_seconds).zip(&work.points) {
@@ -29,5 +36,10 @@ pub fn write_cost(run: &RunFolder, model: &Model, work: &Work, output_seconds: f
     wall("factorisation", linear.factor_time.as_secs_f64(), count, flops);
     wall("solve", linear.solve_time.as_secs_f64(), linear.solves.into(), Cell::Empty);
     wall("output", output_seconds, Cell::Empty, Cell::Empty);
+    if let Some((work, seconds)) = estimate {
+        let (points, count) = (work.points.iter().sum::<usize>(), work.linear.factorisations);
+        let cost = [seconds.into(), "wall".into(), points.into(), count.into(), work.linear.factor_flops.into()];
+        rows.add(["estimate".into()].into_iter().chain(cost));
+    }
     run.write("tables/cost.csv", rows.text)
 }

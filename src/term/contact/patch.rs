@@ -103,6 +103,17 @@ impl Patch {
         Patch { control, ..*self }
     }
 
+    /// y(s, t) alone.
+    fn position(&self, [s, t]: [f64; 2]) -> Vector {
+        let (bs, bt) = (bernstein(s)[0], bernstein(t)[0]);
+        let mut total = [0.0; 3];
+        for (k, point) in self.control.iter().enumerate() {
+            let weight = bs[k % 4] * bt[k / 4];
+            (0..3).for_each(|i| total[i] += weight * point[i]);
+        }
+        total
+    }
+
     pub fn jet(&self, [s, t]: [f64; 2]) -> Jet {
         let (bs, bt) = (bernstein(s), bernstein(t));
         let sum = |ds: usize, dt: usize| {
@@ -119,7 +130,7 @@ impl Patch {
     /// Minimises |y(s, t) - x|^2 over the unit square: Newton's method with exact second derivatives, kept in the square,
     /// from the best of a 4 x 4 grid.
     pub fn closest(&self, x: Vector) -> Foot {
-        let distance = |st| norm(subtract(self.jet(st).y, x));
+        let distance = |st| norm(subtract(self.position(st), x));
         let grid = (0..16).map(|k| [(k % 4) as f64 / 3.0, (k / 4) as f64 / 3.0]);
         let mut st = grid.min_by(|a, b| distance(*a).total_cmp(&distance(*b))).unwrap_or([0.5; 2]);
         let mut now = self.jet(st);

@@ -1,0 +1,98 @@
+//! The error of the mesh, estimated beside a run: for the page, the tables and the cost.
+
+use super::prepare::Prepared;
+use crate::error::{Result, Warning};
+use crate::fit::{Estimate, Fit, bias::bias};
+use crate::forward::estimate::Estimator;
+use crate::forward::{Settings, Work};
+use crate::math::tensor::norm;
+use crate::mesh::MaterialPoint;
+use crate::model::State;
+use crate::report::summary::MeshErrors;
+use crate::report::{Frame, MeshError, Probe, Record};
+
+/// What a run estimates; nothing where it was not asked for.
+pub(super) struct Estimates<'m> {
+    estimator: Option<Estimator<'m>>,
+    names: Vec<String>,
+    points: Vec<MaterialPoint>,
+    pub errors: MeshErrors,
+}
+
+impl<'m> Estimates<'m> {
+    /// Of points with names.
+    pub fn new(
+        prepared: &'m Prepared,
+        settings: Settings,
+        points: impl Iterator<Item = (String, MaterialPoint)>,
+    ) -> Result<Estimates<'m>> {
+        let estimator = match &prepared.halved {
+            Some(halved) => Some(Estimator::new(&prepared.built.model, halved, settings)?),
+            None => None,
+        };
+        let (names, points) = points.unzip();
+        Ok(Estimates { estimator, names, points, errors: MeshErrors::default() })
+    }
+
+    /// Estimates the errors of the probes in an equilibrium and writes them; gives the warning where that fails.
+    pub fn forward(&mut self, frame: Frame, state: &State, record: &mut Record<'_>) -> Result<Option<Warning>> {
+        self.frame(frame, "probe", state, record, |_| Vec::new())
+    }
+
+    /// The same of the markers and of the controls that were fitted.
+    pub fn fit(
+        &mut self,
+        frame: Frame,
+        fitted: &Estimate,
+        fit: &Fit<'_>,
+        labels: &[String],
+        record: &mut Record<'_>,
+    ) -> Result<Option<Warning>> {
+        self.frame(frame, "marker", &fitted.equilibrium.state, record, |shift| {
+            let biases = bias(fitted, fit.markers(), fit.unknowns(), shift);
+            fit.unknowns().iter().map(|control| (labels[*control].clone(), biases[*control])).collect()
+        })
+    }
+
+    fn frame(
+        &mut self,
+        frame: Frame,
+        kind: &'static str,
+        state: &State,
+        record: &mut Record<'_>,
+        biases: impl FnOnce(&[[f64; 3]]) -> Vec<(String, Option<f64>)>,
+    ) -> Result<Option<Warning>> {
+        let Some(estimator) = &mut self.estimator else { return Ok(None) };
+        let corrected = match estimator.corrected(state) {
+            Ok(corrected) => corrected,
+            Err(error) => {
+                return Ok(Some(Warning {
+                    code: "S013",
+                    message: format!("frame {}: no estimate of the error: {error}", frame.index),
+                    place: None,
+                    help: error.help(),
+                }));
+            }
+        };
+        let shift = estimator.shift(state, &corrected, &self.points);
+        let error = MeshError {
+            kind,
+            largest_mm: estimator.largest(state, &corrected),
+            points: self.names.iter().cloned().zip(shift.iter().map(|s| norm(*s))).collect(),
+            biases: biases(&shift),
+        };
+        record.estimate(frame, &error)?;
+        self.errors.add(frame, &error, estimator.seconds());
+        Ok(None)
+    }
+
+    /// Work and seconds, if anything was estimated.
+    pub fn cost(&self) -> Option<(Work, f64)> {
+        self.estimator.as_ref().map(|estimator| (estimator.work(), estimator.seconds()))
+    }
+}
+
+/// The points of probes.
+pub(super) fn of_probes(probes: &[Probe]) -> impl Iterator<Item = (String, MaterialPoint)> + '_ {
+    probes.iter().map(|probe| (probe.name.clone(), probe.at))
+}
