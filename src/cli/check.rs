@@ -62,7 +62,7 @@ pub(super) fn describe(scene: &Scene, model: &Model, halved: Option<&Halved>) ->
     if let Some(halved) = halved {
         let model = &halved.built.model;
         text += &format!(
-            "estimate of the error: one more iteration {}, with {} unknowns: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
+            "estimate of the error: a few more iterations {}, with {} unknowns: factorisation of {:.1} Mflop, {:.1} MB of factor\n",
             if scene.task == Task::Fit { "per frame" } else { "at the end" },
             model.numbering().unknowns(),
             model.factor_flops() / 1e6,

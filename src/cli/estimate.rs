@@ -82,7 +82,7 @@ impl<'m> Estimates<'m> {
             biases: biases(&shift),
         };
         record.estimate(frame, &error)?;
-        self.errors.add(frame, &error, estimator.seconds());
+        self.errors.add(frame, &error, estimator.work().iterations, estimator.seconds());
         Ok(None)
     }
 

@@ -4,6 +4,7 @@ use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
 use crate::math::factor::{self, Factor};
 use crate::math::sparse::SymmetricMatrix;
+use crate::math::tensor::{norm, subtract};
 use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Equations};
 use crate::term::Want;
@@ -172,18 +173,34 @@ impl<'m> Balance<'m> {
         Ok(rhs)
     }
 
-    /// One undamped Newton step from a state with all prescribed motion done, with constraints as open or closed as they
-    /// are: K d + B^T z = - r, B d = 0. `None` where it does not lower the residual.
-    pub fn corrected(&mut self, state: &State) -> Result<Option<State>> {
-        let before = self.evaluate(state, Want::Force, None).residual;
-        let mut step: Vec<f64> = before.iter().map(|r| -r).collect();
-        self.solve_held(state, &mut step, vec![None])?;
-        let mut next = state.clone();
-        self.model.advance(&mut next, &step, 1.0);
-        let after = self.evaluate(&next, Want::Force, None);
-        self.work.iterations += 1;
-        let lower = after.det_f.min > 0.0 && self.norm(&after.residual) <= self.norm(&before);
-        Ok(lower.then_some(next))
+    /// Undamped Newton steps from a state with all prescribed motion done, with constraints as open or closed as they are:
+    /// K d + B^T z = - r, B d = 0, until a step is no more than `part` of the whole way. `None` where one does not lower the
+    /// residual.
+    pub fn corrected(&mut self, from: &State, part: f64, most: usize) -> Result<Option<State>> {
+        let mut state = from.clone();
+        let mut residual = self.evaluate(&state, Want::Force, None).residual;
+        for _ in 0..most {
+            let mut step: Vec<f64> = residual.iter().map(|r| -r).collect();
+            self.solve_held(&state, &mut step, vec![None])?;
+            self.model.advance(&mut state, &step, 1.0);
+            self.work.iterations += 1;
+            let after = self.evaluate(&state, Want::Force, None);
+            if after.det_f.min <= 0.0 || !(self.norm(&after.residual) <= self.norm(&residual)) {
+                return Ok(None);
+            }
+            residual = after.residual;
+            if self.largest(&self.model.displacement_of(&step)) <= part * self.largest(&moved(from, &state)) {
+                return Ok(Some(state));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The longest of the displacements of nodes, mm.
+    fn largest(&self, u: &[[f64; 3]]) -> f64 {
+        let values =
+            u.iter().zip(&self.model.mesh().parameter_derivative).filter(|(_, derivative)| **derivative == 0);
+        values.map(|(u, _)| norm(*u)).fold(0.0, f64::max)
     }
 
     /// Factorises the tangent at a state, to see its negative modes.
@@ -443,6 +460,11 @@ impl Equations for Balance<'_> {
         }
         (squares / a.unknowns.len().max(1) as f64).sqrt()
     }
+}
+
+/// The displacement from one state to another.
+fn moved(from: &State, to: &State) -> Vec<[f64; 3]> {
+    from.u.iter().zip(&to.u).map(|(a, b)| subtract(*b, *a)).collect()
 }
 
 /// What part of the first gap is still outstanding: gaps shrink in proportion.

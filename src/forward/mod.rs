@@ -476,14 +476,14 @@ impl<'m> Solver<'m> {
         self.balance.solve_with_tangent(state, rhs, columns)
     }
 
-    /// The state after one Newton step from `state`, in which all prescribed motion is done: what a state that is near an
-    /// equilibrium lacks, to first order. Where the step does not lower the residual, `state` is not near, and the
-    /// equilibrium is sought from there, with damped steps and if need be by letting the body go.
+    /// The equilibrium near `state`, in which all prescribed motion is done, by undamped Newton steps that end with one that
+    /// is no more than `part` of the whole way. Where such a step does not lower the residual, `state` is not near, and the
+    /// equilibrium is sought in full, with damped steps and if need be by letting the body go.
     ///
     /// # Errors
     /// As [`Solver::solve_with_tangent`]; no equilibrium.
-    pub fn corrected(&mut self, state: &State) -> Result<State> {
-        if let Some(corrected) = self.balance.corrected(state)? {
+    pub fn corrected(&mut self, state: &State, part: f64) -> Result<State> {
+        if let Some(corrected) = self.balance.corrected(state, part, self.settings.max_iterations)? {
             return Ok(corrected);
         }
         self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });

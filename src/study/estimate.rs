@@ -17,7 +17,7 @@ use std::time::Instant;
 pub struct Estimated {
     /// The errors; activations only of a fit.
     pub errors: Errors,
-    /// Wall time of building the model on halved elements and of one corrected solve per frame, s.
+    /// Wall time of building the model on halved elements and of the Newton steps there, s.
     pub seconds: f64,
 }
 

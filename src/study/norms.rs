@@ -84,12 +84,12 @@ pub fn between(found: &Seen<'_>, best: &Seen<'_>) -> Errors {
             root_mean(pairs().flat_map(|(a, b)| squares_between(&a.controls, &b.controls))),
         );
     }
-    if let (Some(own), Some(known)) = (found.states.last(), best.states.last()) {
-        if let Some([displacement, gradient, det_f]) = fields(mesh, own, best_mesh, known) {
-            errors.set(Measure::Displacement, displacement);
-            errors.set(Measure::Gradient, gradient);
-            errors.set(Measure::DetF, det_f);
-        }
+    if let (Some(own), Some(known)) = (found.states.last(), best.states.last())
+        && let Some([displacement, gradient, det_f]) = fields(mesh, own, best_mesh, known)
+    {
+        errors.set(Measure::Displacement, displacement);
+        errors.set(Measure::Gradient, gradient);
+        errors.set(Measure::DetF, det_f);
     }
     let stored = |seen: &Seen<'_>| -> Option<f64> {
         let terms = seen.model.terms().iter().zip(&seen.last?.energies);

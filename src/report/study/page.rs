@@ -93,7 +93,7 @@ fn estimates(study: &Study, outcome: &Outcome, text: &mut String) {
     }
     let unit = study.measure.unit();
     *text += &format!(
-        "\n## Estimated errors\n\nOne corrected solve on halved elements; its seconds hold the building of that model.\n\n\
+        "\n## Estimated errors\n\nA few Newton steps on halved elements; their seconds hold the building of that model.\n\n\
          | variant | estimate {unit} | true {unit} | ratio | seconds |\n|---|---|---|---|---|\n"
     );
     let mut ratios = Vec::new();

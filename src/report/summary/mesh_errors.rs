@@ -22,14 +22,15 @@ pub struct MeshErrors {
     body: Vec<Largest>,
     points: Vec<Largest>,
     biases: Vec<Largest>,
+    steps: usize,
     seconds: f64,
 }
 
 impl MeshErrors {
-    /// Adds a frame; `seconds` is the wall time of all estimates so far.
-    pub fn add(&mut self, frame: Frame, error: &MeshError, seconds: f64) {
+    /// Adds a frame; `steps` and `seconds` are the Newton steps and the wall time of all estimates so far.
+    pub fn add(&mut self, frame: Frame, error: &MeshError, steps: usize, seconds: f64) {
         self.frames += 1;
-        self.seconds = seconds;
+        (self.steps, self.seconds) = (steps, seconds);
         keep(&mut self.body, "anywhere", error.largest_mm, frame);
         error.points.iter().for_each(|(name, mm)| keep(&mut self.points, name, *mm, frame));
         error.biases.iter().filter_map(|(name, bias)| Some((name, (*bias)?))).for_each(|(name, bias)| {
@@ -57,14 +58,11 @@ impl fmt::Display for MeshErrors {
         points.sort_by(|a, b| b.value.total_cmp(&a.value));
         let points = points.into_iter().take(SHOWN).chain(&self.body);
         let shown: Vec<String> = points.map(|l| format!("{} {} mm{}", l.name, short(l.value), at(l))).collect();
-        let solves = match self.frames {
-            1 => "one corrected solve".into(),
-            frames => count(frames, "corrected solve"),
-        };
         writeln!(
             out,
-            "  estimated error of the mesh: {}; {solves} on halved elements, {:.1} s",
+            "  estimated error of the mesh: {}; {} on halved elements, {:.1} s",
             shown.join(", "),
+            count(self.steps, "Newton step"),
             self.seconds
         )?;
         if self.biases.is_empty() {
@@ -104,13 +102,13 @@ mod tests {
             points: vec![("B1".into(), tip), ("B2".into(), 0.01)],
             biases: vec![("top".into(), Some(bias)), ("low".into(), None)],
         };
-        errors.add(Frame { index: 3, time_s: 0.1 }, &error(0.912, -0.02), 1.0);
-        let one = "  estimated error of the mesh: B1 0.91 mm, B2 0.010 mm, anywhere 1.8 mm; one corrected solve on halved \
+        errors.add(Frame { index: 3, time_s: 0.1 }, &error(0.912, -0.02), 3, 1.0);
+        let one = "  estimated error of the mesh: B1 0.91 mm, B2 0.010 mm, anywhere 1.8 mm; 3 Newton steps on halved \
                    elements, 1.0 s\n  estimated bias of what was fitted, the largest: top -0.020\n";
         assert_eq!(errors.to_string(), one);
-        errors.add(Frame { index: 4, time_s: 0.2 }, &error(0.5, 0.03), 1.5);
+        errors.add(Frame { index: 4, time_s: 0.2 }, &error(0.5, 0.03), 7, 1.5);
         let two = errors.to_string();
-        assert!(two.contains("B1 0.91 mm in frame 3") && two.contains("2 corrected solves"), "{two}");
+        assert!(two.contains("B1 0.91 mm in frame 3") && two.contains("7 Newton steps"), "{two}");
         assert!(two.contains("top +0.030 in frame 4"), "{two}");
         assert_eq!([short(12.3), short(0.0123), short(1e-9), short(0.0)], ["12", "0.012", "1.0e-9", "0.0e0"]);
     }
