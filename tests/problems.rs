@@ -78,10 +78,20 @@ fn check(folder: &Path) {
     println!("{name}: {} values", expected.value.len());
 }
 
+/// The cells of a line; a comma in quotes is none between cells.
+fn cells(line: &str) -> Vec<&str> {
+    let mut quoted = false;
+    let between = |c: char| {
+        quoted ^= c == '"';
+        c == ',' && !quoted
+    };
+    line.split(between).map(|cell| cell.trim_matches('"')).collect()
+}
+
 /// The number in a column of the one row whose cells are as wanted.
 fn cell(table: &Path, row: &BTreeMap<String, toml::Value>, column: &str) -> f64 {
     let text = std::fs::read_to_string(table).unwrap_or_else(|error| panic!("{}: {error}", table.display()));
-    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let mut lines = text.lines().map(cells);
     let header = lines.next().expect("a header");
     let index = |name: &str| {
         header.iter().position(|h| *h == name).unwrap_or_else(|| panic!("{}: no column {name}", table.display()))

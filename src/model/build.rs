@@ -455,10 +455,8 @@ fn coarse_rule(spec: &MuscleSpec, host: &GeometrySpec, muscle: &Muscle, host_ele
     }
     let enough = (spec.gauss as f64 * POINTS_PER_HOST_ELEMENT / fewest).ceil();
     let help = match spec.cut {
-        true => format!("use gauss = {enough:.0} for this muscle, 3 is enough"),
-        false => format!(
-            "write cut = true for this muscle: then gauss = 3 is enough; or gauss = {enough:.0}, or more elements in its mesh"
-        ),
+        true => "use gauss = 3 for this muscle".to_owned(),
+        false => format!("write cut = true for this muscle, or gauss = {enough:.0}, or more elements in its mesh"),
     };
     Some(Warning {
         code: "G007",
