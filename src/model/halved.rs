@@ -100,7 +100,8 @@ fn halved(scene: &Scene, mesh: &Mesh) -> Result<(Scene, Halving), Box<Warning>> 
         let own = super::tissue::elements(&region.part, mesh);
         region.part = PartSpec::Elements(own.into_iter().flat_map(|element| halving.parts(element)).collect());
     }
-    for muscle in &mut scene.muscles {
+    // a rule that is cut at the elements of the host follows them
+    for muscle in scene.muscles.iter_mut().filter(|muscle| !muscle.cut) {
         muscle.gauss *= 2;
     }
     Ok((scene, halving))

@@ -8,6 +8,7 @@ use super::references::References;
 use super::spec::*;
 use super::tree::{Node, Value};
 use super::units::Units;
+use crate::math::factor::Precision;
 
 /// The scene of a whole file; `None` if there is any mistake in a value.
 pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: &Mistakes) -> Option<Scene> {
@@ -78,7 +79,13 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
 
 impl Default for SolverSpec {
     fn default() -> Self {
-        SolverSpec { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+        SolverSpec {
+            tolerance: 1e-8,
+            max_iterations: 30,
+            step_max: 1.0,
+            step_min: 1e-4,
+            precision: Precision::Double,
+        }
     }
 }
 
@@ -541,11 +548,14 @@ fn solver(table: &mut Table) -> Option<SolverSpec> {
     let max_iterations = table.or("max_iterations", default.max_iterations, |item| item.whole(1, 10_000));
     let step_max = table.or("step_max", default.step_max, |item| item.number(PART));
     let step_min = table.or("step_min", default.step_min, |item| item.number(PART));
+    let precisions = [Precision::Double, Precision::Single].map(|precision| (precision.word(), precision));
+    let precision = table.or("precision", default.precision, |item| item.choice(&precisions, &[]));
     let (step_max, step_min) = (step_max?, step_min?);
     if step_min > step_max {
         return table.contradiction("step_min", "step_max", step_min, &format!("at most step_max = {step_max:?}"));
     }
-    Some(SolverSpec { tolerance: tolerance?, max_iterations: max_iterations?, step_max, step_min })
+    let (tolerance, max_iterations, precision) = (tolerance?, max_iterations?, precision?);
+    Some(SolverSpec { tolerance, max_iterations, step_max, step_min, precision })
 }
 
 fn output(table: &mut Table) -> Option<OutputSpec> {

@@ -100,7 +100,7 @@ impl Scene {
             lines.push(format!("position_mm = {}", numbers(position_mm)));
             lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
         }
-        let SolverSpec { tolerance, max_iterations, step_max, step_min } = *solver;
+        let SolverSpec { tolerance, max_iterations, step_max, step_min, precision } = *solver;
         let OutputSpec { view, every, estimate } = output;
         lines.extend([
             "\n[solver]".into(),
@@ -108,6 +108,7 @@ impl Scene {
             format!("max_iterations = {max_iterations}"),
             format!("step_max = {}", number(step_max)),
             format!("step_min = {}", number(step_min)),
+            format!("precision = {}", text(precision.word())),
             "\n[output]".into(),
             format!("view = {view}"),
             format!("every = {every}"),

@@ -5,6 +5,7 @@
 
 use super::units::Units;
 use crate::error::Place;
+use crate::math::factor::Precision;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -802,6 +803,8 @@ pub struct SolverSpec {
     pub step_max: f64,
     /// The smallest part of the load path before the solver gives up; not above `step_max`.
     pub step_min: f64,
+    /// In which numbers the tangent is factorised; solutions are refined in double precision.
+    pub precision: Precision,
 }
 
 /// What is written beside the tables: `[output]`.
