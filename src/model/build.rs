@@ -17,9 +17,9 @@ use crate::mesh::join::join;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceMeshSpec, FaceMuscleSpec, FaceName,
-    FaceSpec, FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec, PressureSpec, Scene,
-    SupportKind, SurfaceSpec,
+    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceMeshSpec, FaceMuscleSpec,
+    FaceName, FaceSpec, FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec,
+    PressureSpec, Scene, SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
 use crate::term::bone::Bone;

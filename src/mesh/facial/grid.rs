@@ -15,6 +15,8 @@ pub(super) const ROWS: usize = 20;
 pub(super) const MOUTH_ROW: usize = 6;
 /// The mouth ends at this column.
 pub(super) const MOUTH_END: usize = 3;
+/// The height of the wings of the nose in rows.
+const NOSE_ROW: f64 = 10.5;
 /// The row of the lids.
 pub(super) const EYE_ROW: usize = 14;
 /// The columns of the inner and outer corner of the eye.
@@ -25,13 +27,16 @@ const U: [f64; COLUMNS + 1] =
     [0.0, 7.0, 14.0, 21.5, 28.5, 36.0, 43.5, 50.5, 57.5, 64.5, 72.0, 80.0, 88.5, 97.0, 105.5];
 /// v of the rows on the midline, mm.
 const V: [f64; ROWS + 1] = [
-    -93.0, -83.5, -74.0, -64.5, -54.5, -44.0, -34.0, -26.5, -20.0, -13.0, -5.0, 4.0, 14.0, 24.5, 34.0, 43.5, 52.5,
+    -93.0, -83.5, -74.0, -64.5, -55.0, -45.5, -36.2, -28.0, -20.5, -13.0, -6.0, 4.0, 14.0, 24.5, 34.0, 43.5, 52.5,
     62.0, 73.0, 86.0, 100.0,
 ];
 /// How much farther out the columns are at the mouth, whose corner is farther out than that of the eye, mm.
 const MOUTH_U: f64 = 4.0;
-/// How much the corners of the mouth hang below its middle, mm.
-const MOUTH_V: f64 = 0.5;
+/// How much farther in the columns are at the nose, so that one follows the crest of its wing and the next the crease behind
+/// it, mm.
+const NOSE_U: f64 = 1.8;
+/// How much higher the line between the lips is in its middle than the row of its corners, mm.
+const MOUTH_V: f64 = 2.7;
 /// How much the lower border rises to the angle of the jaw, and the upper one falls to the temple, mm.
 const BORDERS: [f64; 2] = [52.0, 26.0];
 /// How far the upper and the lower lid are from the line between the corners, mm.
@@ -39,7 +44,7 @@ const LIDS: [f64; 2] = [4.9, 3.9];
 /// How much the outer corner of the eye is higher than the inner one, mm per column.
 const EYE_SLOPE: f64 = 0.25;
 /// How far the margins of the lips roll in, mm, and over how many rows.
-const ROLL: (f64, f64) = (1.6, 1.2);
+const ROLL: (f64, f64) = (1.0, 1.2);
 
 /// A function of s and t: value, by s, by t, by both.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,23 +60,14 @@ type Line = [f64; 2];
 
 impl Jet {
     fn add(&mut self, other: Jet) {
-        *self = Jet {
-            value: self.value + other.value,
-            s: self.s + other.s,
-            t: self.t + other.t,
-            st: self.st + other.st,
-        };
+        *self =
+            Jet { value: self.value + other.value, s: self.s + other.s, t: self.t + other.t, st: self.st + other.st };
     }
 }
 
 /// factor a(s) b(t).
 fn product(factor: f64, a: Line, b: Line) -> Jet {
-    Jet {
-        value: factor * a[0] * b[0],
-        s: factor * a[1] * b[0],
-        t: factor * a[0] * b[1],
-        st: factor * a[1] * b[1],
-    }
+    Jet { value: factor * a[0] * b[0], s: factor * a[1] * b[0], t: factor * a[0] * b[1], st: factor * a[1] * b[1] }
 }
 
 const ONE: Line = [1.0, 0.0];
@@ -137,6 +133,7 @@ pub(super) fn place(s: f64, t: f64, side: Side) -> [Jet; 2] {
         fade(s, corner, 10.0)
     };
     u.add(product(MOUTH_U, out, around(t, mouth, 6.0)));
+    u.add(product(-NOSE_U, bump(s, 2.6, 2.6, 0.0), around(t, NOSE_ROW, 3.5)));
 
     let mut v = product(1.0, ONE, curve(&V, t));
     let end = COLUMNS as f64;
@@ -144,9 +141,10 @@ pub(super) fn place(s: f64, t: f64, side: Side) -> [Jet; 2] {
     v.add(product(BORDERS[0], square, fade(t, 0.0, 13.0)));
     let [value, slope] = fade(ROWS as f64 - t, 0.0, 7.0);
     v.add(product(-BORDERS[1], square, [value, -slope]));
-    v.add(product(MOUTH_V, bump(s, 0.0, 7.0, 0.0), around(t, mouth, 3.0)));
+    v.add(product(MOUTH_V, bump(s, 0.0, corner + 0.6, 1.5), around(t, mouth, 3.0)));
     let (middle, half) = (0.5 * (EYE_ENDS[0] + EYE_ENDS[1]) as f64, 0.5 * (EYE_ENDS[1] - EYE_ENDS[0]) as f64);
-    let [b, db] = bump(s, middle, 6.0, 0.0);
+    // it has to be 0 on the midline, with its slope
+    let [b, db] = bump(s, middle, middle, 0.0);
     v.add(product(EYE_SLOPE, [(s - middle) * b, b + (s - middle) * db], around(t, eye, 4.0)));
     let above = if t == eye { side == Side::Above } else { t > eye };
     let lids = if above { LIDS[0] } else { -LIDS[1] };
@@ -160,5 +158,5 @@ pub(super) fn roll(s: f64, t: f64, side: Side) -> Jet {
     let above = if t == mouth { side == Side::Above } else { t > mouth };
     let sign = if above { 1.0 } else { -1.0 };
     let d = (1.0 - sign * (t - mouth) / rows).max(0.0);
-    product(depth, bump(s, 0.0, MOUTH_END as f64, 0.0), [d * d * d, -3.0 * d * d * sign / rows])
+    product(depth, bump(s, 0.0, MOUTH_END as f64, 1.5), [d * d * d, -3.0 * d * d * sign / rows])
 }
