@@ -6,6 +6,7 @@ pub mod continuous;
 pub mod element;
 pub mod exf;
 pub mod face;
+pub mod facial;
 pub mod fibre_angles;
 pub mod halved;
 pub mod join;

@@ -11,13 +11,14 @@ use crate::mesh::block::block;
 use crate::mesh::element::{Element, TricubicHermite, Trilinear};
 use crate::mesh::exf::{ExFile, Geometry};
 use crate::mesh::face::{Face, boundary_faces};
+use crate::mesh::facial;
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::join::join;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceName, FaceSpec,
-    FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec, PressureSpec, Scene,
+    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceMeshSpec, FaceMuscleSpec, FaceName,
+    FaceSpec, FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec, PressureSpec, Scene,
     SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
@@ -190,6 +191,11 @@ fn host_with_warning(spec: &MeshSpec) -> Result<(Mesh, Option<Warning>)> {
             }
             Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
         }
+        GeometrySpec::Face(FaceMeshSpec { layers, halved, half, face, landmarks: _ }) => {
+            let options = facial::Options { layers: *layers, halved: *halved, half: *half };
+            Ok((facial::host(&face.sheet, options), None))
+        }
+        GeometrySpec::FaceMuscle(_) => unreachable!("no host is read as a muscle"),
     }
 }
 
@@ -221,6 +227,10 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
                     "boundary is all of it, 7:xi1=0 a single face of element 7, xi1=0 all faces on that side of their \
                      element; faces between two elements are not on the boundary"
                 }
+                GeometrySpec::Face(_) | GeometrySpec::FaceMuscle(_) => {
+                    "a face has skin, deep, rim, lip.upper, lip.lower, lid.upper.L, lid.lower.L, deep.perioral, deep.sliding, \
+                     deep.eye.L, the same with .R unless it is half a face, then midline; and xi1=0 to xi3=1"
+                }
             };
             let face = name.to_string().into();
             return Err(Error::NoSuchFace { face, named, place: Box::new(place.clone()) });
@@ -235,6 +245,12 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
 /// The mesh of a muscle, the angles of its fibres, and the warning of its mesh.
 fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
     let (mesh, file) = match &spec.geometry {
+        GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face }) => {
+            let course = face.muscle(name).unwrap_or_else(|| unreachable!("checked by the scene"));
+            let (mesh, angles) = course.mesh(&face.sheet, *side);
+            return Ok((mesh, angles, None));
+        }
+        GeometrySpec::Face(_) => unreachable!("no muscle is read as a face"),
         GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
         GeometrySpec::Blocks(all) => (blocks(&Trilinear, all), None),
         GeometrySpec::Exf(exf) => {
@@ -244,6 +260,7 @@ fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)
         }
     };
     let angles = match &spec.fibres {
+        FibresSpec::Face => unreachable!("only of a muscle of the face"),
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
             FibreAngles { nodes: nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect() }

@@ -139,6 +139,13 @@ fn geometry(geometry: &GeometrySpec) -> String {
             let field = field.as_ref().map(|field| format!("\nfield = {}", text(field))).unwrap_or_default();
             format!("exf = {}{field}", path(file))
         }
+        GeometrySpec::Face(FaceMeshSpec { landmarks, layers, halved, half, face: _ }) => {
+            let landmarks = landmarks.as_ref().map(|file| format!("landmarks = {}, ", path(file))).unwrap_or_default();
+            format!("face = {{ {landmarks}layers = {layers}, halved = {halved}, half = {half} }}")
+        }
+        GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face: _ }) => {
+            format!("face = {}\nside = \"{}\"", text(name), side.letter())
+        }
     }
 }
 
@@ -206,16 +213,17 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
     if let GeometrySpec::Block(_) = shape {
         lines.push("element = \"trilinear\"".into());
     }
+    lines.extend(match fibres {
+        FibresSpec::Face => None,
+        FibresSpec::Field(field) => Some(format!("angles_field = {}", text(field))),
+        FibresSpec::Uniform(angles) => Some(format!("fibre_angles_deg = {}", numbers(angles))),
+        FibresSpec::Nodes(nodes) => Some(
+            nodes.iter().fold("fibre_angles_nodes_deg = [\n".to_string(), |list, angles| {
+                list + "  " + &numbers(angles) + ",\n"
+            }) + "]",
+        ),
+    });
     lines.extend([
-        match fibres {
-            FibresSpec::Field(field) => format!("angles_field = {}", text(field)),
-            FibresSpec::Uniform(angles) => format!("fibre_angles_deg = {}", numbers(angles)),
-            FibresSpec::Nodes(nodes) => {
-                nodes.iter().fold("fibre_angles_nodes_deg = [\n".to_string(), |list, angles| {
-                    list + "  " + &numbers(angles) + ",\n"
-                }) + "]"
-            }
-        },
         format!("activation = \"{activation}\""),
         format!("gauss = {gauss}"),
         format!("cut = {cut}"),
