@@ -67,7 +67,8 @@ fn obj(mesh: &Mesh, faces: &[Face], parts: usize) -> String {
                 let corners = [node(a, b), node(a + 1, b), node(a + 1, b + 1), node(a, b + 1)];
                 let [p, q, r, s] = corners;
                 // outwards whichever end of the element the face is
-                text += &if face.side.end == 1 { format!("f {p} {q} {r} {s}\n") } else { format!("f {s} {r} {q} {p}\n") };
+                text +=
+                    &if face.side.end == 1 { format!("f {p} {q} {r} {s}\n") } else { format!("f {s} {r} {q} {p}\n") };
             }
         }
         first += (parts + 1) * (parts + 1);

@@ -201,9 +201,8 @@ fn at_points(item: &Item, points: Option<usize>) -> Option<Vec<f64>> {
     }
     let values = item.list("a number, or a list of numbers", |entry| entry.number(POSITIVE))?;
     match points {
-        Some(points) if points != values.len() => {
-            item.wrong_length(&format!("{} entries", values.len()), &format!("{points}, one for each point of the path"))
-        }
+        Some(points) if points != values.len() => item
+            .wrong_length(&format!("{} entries", values.len()), &format!("{points}, one for each point of the path")),
         _ => Some(values),
     }
 }
@@ -282,7 +281,9 @@ pub(super) fn muscle(table: &mut Table, host: Option<&MeshSpec>) -> Option<FaceM
                 let known: Vec<String> = spec.face.muscles.iter().map(|course| course.name.clone()).collect();
                 unknown(&item, "muscle of the face", name, &known, "muscles of the face")
             }
-            Some(_) => item.out_of_range(&format!("{name:?}"), "left out: the mesh is no face; write [mesh] face = {}"),
+            Some(_) => {
+                item.out_of_range(&format!("{name:?}"), "left out: the mesh is no face; write [mesh] face = {}")
+            }
         }
     });
     let ((name, face), side) = (face?, side?);

@@ -3,8 +3,8 @@
 use super::Scene;
 use super::bones;
 use super::contacts;
-use super::face;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
+use super::face;
 use super::nearest::nearest;
 use super::references::References;
 use super::spec::*;

@@ -140,7 +140,8 @@ fn geometry(geometry: &GeometrySpec) -> String {
             format!("exf = {}{field}", path(file))
         }
         GeometrySpec::Face(FaceMeshSpec { landmarks, layers, halved, half, face: _ }) => {
-            let landmarks = landmarks.as_ref().map(|file| format!("landmarks = {}, ", path(file))).unwrap_or_default();
+            let landmarks =
+                landmarks.as_ref().map(|file| format!("landmarks = {}, ", path(file))).unwrap_or_default();
             format!("face = {{ {landmarks}layers = {layers}, halved = {halved}, half = {half} }}")
         }
         GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face: _ }) => {
@@ -223,11 +224,7 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
             }) + "]",
         ),
     });
-    lines.extend([
-        format!("activation = \"{activation}\""),
-        format!("gauss = {gauss}"),
-        format!("cut = {cut}"),
-    ]);
+    lines.extend([format!("activation = \"{activation}\""), format!("gauss = {gauss}"), format!("cut = {cut}")]);
     lines.extend(taper_mm.map(|taper| format!("taper_mm = {}", number(taper))));
     lines.extend([format!(
         "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
@@ -315,7 +312,8 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             numbers(to_mm),
             round(radius_mm, inside)
         ),
-        SurfaceSpec::Reference => "reference = true".into(),
+        SurfaceSpec::Reference(None) => "reference = true".into(),
+        SurfaceSpec::Reference(Some(face)) => format!("reference = {}", faces(face)),
         SurfaceSpec::Faces { face, depth_mm } => {
             let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();
             format!("faces = {{ face = {}{depth} }}", faces(face))

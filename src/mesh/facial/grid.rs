@@ -55,23 +55,14 @@ type Line = [f64; 2];
 
 impl Jet {
     fn add(&mut self, other: Jet) {
-        *self = Jet {
-            value: self.value + other.value,
-            s: self.s + other.s,
-            t: self.t + other.t,
-            st: self.st + other.st,
-        };
+        *self =
+            Jet { value: self.value + other.value, s: self.s + other.s, t: self.t + other.t, st: self.st + other.st };
     }
 }
 
 /// factor a(s) b(t).
 fn product(factor: f64, a: Line, b: Line) -> Jet {
-    Jet {
-        value: factor * a[0] * b[0],
-        s: factor * a[1] * b[0],
-        t: factor * a[0] * b[1],
-        st: factor * a[1] * b[1],
-    }
+    Jet { value: factor * a[0] * b[0], s: factor * a[1] * b[0], t: factor * a[0] * b[1], st: factor * a[1] * b[1] }
 }
 
 const ONE: Line = [1.0, 0.0];

@@ -152,7 +152,12 @@ impl Course {
                 let part = (wanted - lengths[k - 1]) / (lengths[k] - lengths[k - 1]);
                 let x = samples[k - 1] + part.clamp(0.0, 1.0) / STEPS as f64;
                 let (at, tangent) = self.line(x);
-                Station { at, tangent, width: self.between(&self.width, x), thickness: self.between(&self.thickness, x) }
+                Station {
+                    at,
+                    tangent,
+                    width: self.between(&self.width, x),
+                    thickness: self.between(&self.thickness, x),
+                }
             })
             .collect()
     }
