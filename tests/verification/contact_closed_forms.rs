@@ -7,15 +7,12 @@ use risorius::mesh::block::block;
 use risorius::mesh::element::TricubicHermite;
 use risorius::mesh::face::Face;
 use risorius::model::Model;
-use risorius::model::build::build;
 use risorius::model::supports::Support;
-use risorius::scene::Scene;
 use risorius::term::Term;
 use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
 use risorius::term::contact::surface::{Cylinder, FreeSide, Plane, RigidSurface};
 use risorius::term::contact::{Contact, ContactPoint, Interface};
 use risorius::term::load::traction;
-use std::path::Path;
 
 /// A contact of five points per direction.
 pub fn contact(
@@ -124,41 +121,4 @@ fn a_sector_slides_on_a_cylinder_without_work() {
     assert!(energy < 1e-7 * scale, "energy {energy} uJ of {scale}");
     let gap = contact_points(&model, &found).iter().map(|p| p.gap.expect("no edge").abs()).fold(0.0, f64::max);
     assert!(gap < 1e-3, "gap {gap} mm");
-}
-
-/// The first half of a bar stays on where the whole of its bottom was and is pushed 25 mm along it, a motion without strain;
-/// on where that half alone was it has come to the end of the surface.
-#[test]
-fn a_face_slides_on_where_other_faces_were() {
-    let problem = |surface: &str| {
-        format!(
-            "[task]\nkind = \"forward\"\n\
-             [mesh]\nblock = {{ origin_mm = [0, 0, 0], size_mm = [40, 10, 10], elements = [4, 1, 1] }}\n\
-             [tissue]\nmooney-rivlin = {{ c1_kpa = 0.5, c2_kpa = 0.2 }}\n\
-             [[support]]\nplate = {{ face = \"xi1=0\", offset_mm = 25 }}\n\
-             [[support]]\nsymmetry = {{ face = \"xi2=0\" }}\n\
-             [[support]]\nsymmetry = {{ face = \"xi3=1\" }}\n\
-             [[sliding]]\nface = [\"0:xi3=0\", \"1:xi3=0\"]\nsurface = {{ reference = {surface} }}\n\
-             law = {{ penalty = {{ kpa_per_mm = 5 }} }}\n"
-        )
-    };
-    let solve = |surface: &str| {
-        let scene = Scene::parse(&problem(surface), "bar.toml", Path::new("."), &[]).expect("a scene");
-        let model = build(&scene).expect("a model").model;
-        let mut solver = Solver::new(&model, Settings::default()).expect("memory");
-        let drive = Drive { controls: Vec::new(), load: 1.0 };
-        solver.equilibrium(&model.rest(), &drive).map(|found| {
-            let x = model.current(&found.state);
-            model.mesh().parameters.iter().zip(x).zip(&model.mesh().parameter_derivative).fold(
-                0.0_f64,
-                |worst, ((from, to), d)| {
-                    let along = if *d == 0 { 25.0 } else { 0.0 };
-                    worst.max((to[0] - from[0] - along).abs()).max((to[2] - from[2]).abs())
-                },
-            )
-        })
-    };
-    assert!(solve("\"xi3=0\"").unwrap_or_else(|failure| panic!("{}", failure.error)) < 1e-7);
-    let failure = solve("true").expect_err("it has no surface to be on");
-    assert!(failure.error.to_string().contains("off"), "{}", failure.error);
 }
