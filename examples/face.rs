@@ -3,7 +3,7 @@
 //!     cargo run --example face -- OUT [problem.toml]
 //!
 //! `OUT/skin.obj` and `OUT/deep.obj` have every element face cut in 6 x 6, `OUT/<muscle>.obj` the surface of each muscle mesh,
-//! `OUT/fibres.csv` a fibre direction in the middle of each muscle element. `examples/python/face.py` makes pictures of them.
+//! `OUT/fibres.csv` a fibre direction in the middle of the outer side of each muscle element. `examples/python/face.py` makes pictures of them.
 
 use risorius::mesh::face::{Face, boundary_faces};
 use risorius::mesh::facial::{BodySide, Options, host};
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let name = format!("{}.{}", course.name, side.letter());
             fs::write(out.join(format!("{name}.obj")), obj(&mesh, &boundary_faces(&mesh), 1))?;
             for element in 0..mesh.elements() {
-                let (x, _) = position_and_jacobian(mesh.element, &mesh.local(element), [0.5; 3]);
+                let (x, _) = position_and_jacobian(mesh.element, &mesh.local(element), [0.5, 0.5, 1.0]);
                 let d = angles.direction(&mesh, element, &mesh.local(element), [0.5; 3]);
                 writeln!(fibres, "{name},{},{},{},{},{},{}", x[0], x[1], x[2], d[0], d[1], d[2])?;
             }

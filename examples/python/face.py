@@ -52,9 +52,9 @@ def actor(source, colour, opacity=1.0):
 def eyes():
     """Two white balls behind the lids, which are no part of the model."""
     for side in (1, -1):
-        for radius, z, colour in ((12.2, 83.2, (0.95, 0.95, 0.93)), (5.6, 90.2, (0.35, 0.28, 0.22))):
+        for radius, z, colour in ((14.5, 80.0, (0.95, 0.95, 0.93)), (5.6, 89.4, (0.35, 0.28, 0.22))):
             ball = vtk.vtkSphereSource()
-            ball.SetCenter(side * 31.2, 34.8, z)
+            ball.SetCenter(side * 31.5, 34.8, z)
             ball.SetRadius(radius)
             ball.SetThetaResolution(48)
             ball.SetPhiResolution(48)

@@ -39,7 +39,7 @@ const LIDS: [f64; 2] = [4.9, 3.9];
 /// How much the outer corner of the eye is higher than the inner one, mm per column.
 const EYE_SLOPE: f64 = 0.25;
 /// How far the margins of the lips roll in, mm, and over how many rows.
-const ROLL: (f64, f64) = (2.2, 1.2);
+const ROLL: (f64, f64) = (1.6, 1.2);
 
 /// A function of s and t: value, by s, by t, by both.
 #[derive(Debug, Clone, Copy, Default)]

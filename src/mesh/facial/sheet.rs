@@ -4,7 +4,7 @@
 //! through the thickness of every landmark along its direction inwards. w = 1 is skin, w = 0 is deep.
 
 use super::radial::{Jet, Radial};
-use crate::math::tensor::{Vector, cross, normalised};
+use crate::math::tensor::{Vector, add_scaled, cross, normalised};
 
 /// A named point of the skin of the left half or the midline; the right half mirrors it.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,9 +21,11 @@ pub struct Landmark {
     pub thickness: f64,
 }
 
-/// The axis about which the face bends, x = 0, z = this, mm: inwards is halfway between towards it and the normal of the
-/// skin. The normal alone would fold the deep surface inside the nose, the axis alone would thin it at the sides of the nose.
+/// The axis about which the face bends, x = 0, z = this, mm: inwards is halfway between towards it and the mean normal of the
+/// skin around. The normal alone would fold the deep surface inside the nose, the axis alone would thin it at its sides.
 const AXIS_Z: f64 = 30.0;
+/// How far around a landmark the normal is averaged, mm: grooves as narrow as those of the lips do not turn it.
+const AROUND: f64 = 7.0;
 
 /// The map.
 #[derive(Debug, Clone)]
@@ -54,8 +56,15 @@ impl Sheet {
         let ways: Vec<Vector> = landmarks
             .iter()
             .map(|landmark| {
-                let at = skin.at(landmark.u, landmark.v);
-                let normal = normalised(cross(at.u, at.v));
+                let around = [[0.0, 0.0], [AROUND, 0.0], [-AROUND, 0.0], [0.0, AROUND], [0.0, -AROUND]];
+                let normals = around.map(|[du, dv]| {
+                    let at = skin.at(landmark.u + du, landmark.v + dv);
+                    normalised(cross(at.u, at.v))
+                });
+                let mut normal = normalised(normals.iter().fold([0.0; 3], |sum, n| add_scaled(sum, 1.0, *n)));
+                if landmark.u == 0.0 {
+                    normal[0] = 0.0;
+                }
                 let [x, _, z] = landmark.position;
                 let away = normalised([x, 0.0, z - AXIS_Z]);
                 let outwards = normalised(std::array::from_fn(|i| normal[i] + away[i]));
