@@ -504,7 +504,7 @@ fn regions_and_points_must_lie_in_the_host() {
 const CONTACTS: &str = r#"
 [[sliding]]
 face = "xi3=0"
-surface = { reference = true }
+surface = { reference = "xi3=1" }
 law = { augmented = { kpa_per_mm = 50, gap_mm = 1e-3 } }
 [[sliding]]
 name = "pole"
@@ -572,7 +572,7 @@ fn contacts_are_read_and_locked() {
     assert_eq!(scene.lock(), again.lock());
 
     let mistakes = [
-        ("reference = true", "reference = false", "C005"),
+        ("reference = \"xi3=1\"", "reference = false", "C005"),
         ("normal = [0, 0, -1]", "normal = [0, 0, 0]", "C005"),
         ("to_mm = [90, 20, 10]", "to_mm = [90, 0, 10]", "C005"),
         ("radius_mm = 9,", "radius_mm = 0,", "C005"),

@@ -364,7 +364,11 @@ fn contact(
             (Between::Two(own, others), *depth_mm)
         }
         SurfaceSpec::Itself { depth_mm } => (Between::Itself(own), *depth_mm),
-        _ => return rigid_contact(spec, allows, mesh, &own, bone),
+        SurfaceSpec::Reference(Some(face)) => {
+            let before = faces(scene, mesh, face, &spec.place)?;
+            return rigid_contact(spec, allows, mesh, [&own, &before], bone);
+        }
+        _ => return rigid_contact(spec, allows, mesh, [&own, &own], bone),
     };
     let manner = Manner { law: contact_law(&spec.law), relax: spec.initial == InitialSpec::Relax, depth };
     let contact = Mutual::new(&spec.name, manner, mesh, between, spec.gauss);
@@ -384,11 +388,12 @@ fn contact_law(law: &ContactLawSpec) -> Box<dyn ContactLaw> {
     }
 }
 
+/// Contact of the first faces with a rigid surface, which may be where the second ones are at rest.
 fn rigid_contact(
     spec: &ContactSpec,
     allows: Allows,
     mesh: &Mesh,
-    faces: &[Face],
+    [faces, before]: [&[Face]; 2],
     bone: Option<Arc<Bone>>,
 ) -> Result<(Box<dyn Term>, Option<Warning>)> {
     let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
@@ -405,8 +410,8 @@ fn rigid_contact(
         SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
             Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
         }
-        SurfaceSpec::Reference | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
-            Box::new(Patches::new(mesh, faces, FreeSide::Inside))
+        SurfaceSpec::Reference(_) | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
+            Box::new(Patches::new(mesh, before, FreeSide::Inside))
         }
     };
     let relax = spec.initial == InitialSpec::Relax;

@@ -312,7 +312,8 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             numbers(to_mm),
             round(radius_mm, inside)
         ),
-        SurfaceSpec::Reference => "reference = true".into(),
+        SurfaceSpec::Reference(None) => "reference = true".into(),
+        SurfaceSpec::Reference(Some(face)) => format!("reference = {}", faces(face)),
         SurfaceSpec::Faces { face, depth_mm } => {
             let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();
             format!("faces = {{ face = {}{depth} }}", faces(face))

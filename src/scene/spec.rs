@@ -454,8 +454,9 @@ pub enum SurfaceSpec {
         /// Whether the body is inside.
         inside: bool,
     },
-    /// The face itself, where it was before anything moved; the body is on its own side of it.
-    Reference,
+    /// A face of the host where it was before anything moved; the body is on its own side of it. `None`: the face that
+    /// meets it.
+    Reference(Option<FaceSpec>),
     /// Other faces of the host, which yield; not for sliding.
     Faces {
         /// The faces.
