@@ -1,7 +1,7 @@
 //! `[[bone]]`: rigid bodies that move, and what is tied to them.
 
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, Reader, Table};
-use super::face;
+use super::face::{self, Named};
 use super::interpret::direction;
 use super::references::help_for_name;
 use super::spec::{AttachmentSpec, BoneSpec, HingeSpec, MeshSpec, SlideSpec, TieSpec};
@@ -49,14 +49,16 @@ fn bounds(item: Item) -> Option<[f64; 2]> {
 }
 
 pub(super) fn attachment(table: &mut Table, host: Option<&MeshSpec>) -> Option<AttachmentSpec> {
-    let ligament = table.item("ligament").map(|item| face::ligament(&item, host));
-    let position_mm = match ligament {
-        Some(_) if table.has("position_mm") => {
-            drop(table.item("position_mm"));
-            table.not_exactly_one(&["position_mm", "ligament"], &["position_mm", "ligament"])
+    const KEYS: [&str; 3] = ["position_mm", "ligament", "origin"];
+    let found: Vec<&str> = KEYS.into_iter().filter(|key| table.has(key)).collect();
+    let position_mm = match found[..] {
+        ["ligament"] => table.item("ligament").and_then(|item| face::named_point(&item, Named::Ligament, host)),
+        ["origin"] => table.item("origin").and_then(|item| face::named_point(&item, Named::Origin, host)),
+        [_, _, ..] => {
+            KEYS.iter().for_each(|key| drop(table.item(key)));
+            table.not_exactly_one(&KEYS, &found)
         }
-        Some(position_mm) => position_mm,
-        None => table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE)),
+        _ => table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE)),
     };
     let spring: Reader<TieSpec> = |item| {
         let stiffness_mn_per_mm = item.number(NOT_NEGATIVE)?;

@@ -296,8 +296,15 @@ pub(super) fn muscle(table: &mut Table, host: Option<&MeshSpec>) -> Option<FaceM
     Some(FaceMuscleSpec { name, side, face })
 }
 
-/// Where `ligament = "zygomatic.L"` of an attachment is, mm.
-pub(super) fn ligament(item: &Item, host: Option<&MeshSpec>) -> Option<[f64; 3]> {
+/// What a point of the face can be named by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Named {
+    Ligament,
+    Origin,
+}
+
+/// Where `ligament = "zygomatic.L"` or `origin = "zygomaticus_major.L"` of an attachment is, mm.
+pub(super) fn named_point(item: &Item, kind: Named, host: Option<&MeshSpec>) -> Option<[f64; 3]> {
     let written = item.name()?;
     let face = match host.map(|host| &host.geometry) {
         None => built_in_face(),
@@ -307,16 +314,31 @@ pub(super) fn ligament(item: &Item, host: Option<&MeshSpec>) -> Option<[f64; 3]>
             return item.out_of_range(&format!("{written:?}"), allowed);
         }
     };
-    let found = BodySide::ALL.into_iter().find_map(|side| {
-        let name = written.strip_suffix(side.letter())?.strip_suffix('.')?;
-        face.ligament(name, side)
-    });
+    let find = |name: &str, side| match kind {
+        Named::Ligament => face.ligament(name, side),
+        Named::Origin => face.origin(name, side),
+    };
+    let found = BodySide::ALL
+        .into_iter()
+        .find_map(|side| find(written.strip_suffix(side.letter())?.strip_suffix('.')?, side));
     if found.is_some() {
         return found;
     }
-    let known: Vec<String> =
-        face.ligaments.iter().flat_map(|a| ["L", "R"].map(|side| format!("{}.{side}", a.name))).collect();
-    unknown(item, "ligament of the face", written, &known, "ligaments of the face")
+    let (names, what, all): (Vec<&String>, _, _) = match kind {
+        Named::Ligament => {
+            (face.ligaments.iter().map(|l| &l.name).collect(), "ligament of the face", "ligaments of the face")
+        }
+        Named::Origin => {
+            let with_origin = face.muscles.iter().filter(|course| course.has_origin());
+            (
+                with_origin.map(|m| &m.name).collect(),
+                "origin of a muscle of the face",
+                "origins of muscles of the face",
+            )
+        }
+    };
+    let known: Vec<String> = names.iter().flat_map(|n| ["L", "R"].map(|side| format!("{n}.{side}"))).collect();
+    unknown(item, what, written, &known, all)
 }
 
 fn unknown<T>(item: &Item, kind: &'static str, name: String, known: &[String], kinds: &str) -> Option<T> {

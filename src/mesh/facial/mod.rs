@@ -56,6 +56,17 @@ impl Facial {
     /// Where the ligament of this name is on a side, mm.
     pub fn ligament(&self, name: &str, side: BodySide) -> Option<Vector> {
         let anchor = self.ligaments.iter().find(|anchor| anchor.name == name)?;
-        Some(side.of_left(self.sheet.at(anchor.u, anchor.v, ANCHOR_DEPTH).position))
+        Some(self.anchor(anchor.u, anchor.v, side))
+    }
+
+    /// Where the middle of the origin of a muscle meets the deep surface on a side, mm; `None` for a ring and for a half ring
+    /// that begins on the midline, which have none.
+    pub fn origin(&self, name: &str, side: BodySide) -> Option<Vector> {
+        let course = self.muscle(name)?;
+        course.has_origin().then(|| self.anchor(course.path[0][0], course.path[0][1], side))
+    }
+
+    fn anchor(&self, u: f64, v: f64, side: BodySide) -> Vector {
+        side.of_left(self.sheet.at(u, v, ANCHOR_DEPTH).position)
     }
 }

@@ -77,6 +77,11 @@ struct Station {
 }
 
 impl Course {
+    /// Whether it begins somewhere, and not in a ring or on the midline.
+    pub fn has_origin(&self) -> bool {
+        !self.closed && self.path[0][0] > 0.0
+    }
+
     /// The mesh of the muscle on a side and the angles of its fibres. xi1 runs along the line, xi3 outwards; nodes are
     /// numbered along, then across, then through the muscle.
     pub fn mesh(&self, sheet: &Sheet, side: BodySide) -> (Mesh, FibreAngles) {
