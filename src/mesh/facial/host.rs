@@ -137,7 +137,7 @@ fn map(pair: Pair, change: impl Fn(Node) -> Node) -> Pair {
     Pair { skin: change(pair.skin), way: change(pair.way) }
 }
 
-/// The node halfway between two: each of `lines` holds a parameter and its derivative along the line between them.
+/// The node halfway between two: `line` and `other` are each a parameter and its derivative along the line between them.
 fn between(a: Pair, b: Pair, line: [usize; 2], other: [usize; 2]) -> Pair {
     let (h, g) = (TricubicHermite.values_1d(0.5), TricubicHermite.slopes_1d(0.5));
     let node = |a: Node, b: Node| {

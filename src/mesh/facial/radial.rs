@@ -58,8 +58,8 @@ impl Radial {
     pub fn new(centres: &[[f64; 2]], values: &[Vector]) -> Option<Radial> {
         let lateral: Vec<usize> = (0..centres.len()).filter(|i| centres[*i][0] > 0.0).collect();
         let all: Vec<usize> = (0..centres.len()).collect();
-        let (odd, first) = solve(centres, &lateral, values, true, &[0])?;
-        let (even, rest) = solve(centres, &all, values, false, &[1, 2])?;
+        let [odd, first] = solve(centres, &lateral, values, true, &[0])?;
+        let [even, rest] = solve(centres, &all, values, false, &[1, 2])?;
         let mut weights: Vec<Vector> = even.iter().map(|w| [0.0, w[0], w[1]]).collect();
         for (i, w) in lateral.iter().zip(odd) {
             weights[*i][0] = w[0];
@@ -104,14 +104,14 @@ impl Radial {
     }
 }
 
-/// The weights of the kernels at the centres `used` and of the polynomials, for the components `components`.
+/// The weights of the kernels at the centres `used` and of the polynomials; each has one for every component of `components`.
 fn solve(
     centres: &[[f64; 2]],
     used: &[usize],
     values: &[Vector],
     odd: bool,
     components: &[usize],
-) -> Option<(Vec<Vec<f64>>, Vec<Vec<f64>>)> {
+) -> Option<[Vec<Vec<f64>>; 2]> {
     let polynomials = |p: [f64; 2]| if odd { vec![p[0]] } else { vec![1.0, p[1]] };
     let (n, m) = (used.len(), if odd { 1 } else { 2 });
     let mut matrix = DMatrix::zeros(n + m, n + m);
@@ -135,5 +135,5 @@ fn solve(
         weights.iter_mut().zip(found.iter()).for_each(|(w, x)| w.push(*x));
     }
     let polynomial = weights.split_off(n);
-    weights.iter().chain(&polynomial).flatten().all(|w| w.is_finite()).then_some((weights, polynomial))
+    weights.iter().chain(&polynomial).flatten().all(|w| w.is_finite()).then_some([weights, polynomial])
 }
