@@ -415,7 +415,7 @@ fn mistakes_with_ex_files_are_told() {
         (problem(exf, fibres, "[]"), "C007", "at least one face"),
         (problem("exf = \"muscle.exf\"", fibres, side), "G013", "is trilinear"),
         (problem("exf = \"nowhere.exf\"", fibres, side), "C012", "nowhere.exf"),
-        (problem(&format!("{HOST}\n{exf}"), fibres, side), "C011", "exactly one of `block`, `exf`"),
+        (problem(&format!("{HOST}\n{exf}"), fibres, side), "C011", "exactly one of `block`, `blocks`, `exf`, `face`"),
         (problem(exf, &format!("{MUSCLE}\nangles_field = \"fibres\""), side), "C002", "angles_field"),
         (problem(exf, "exf = \"muscle.exf\"", side), "C003", "angles_field"),
         (problem(exf, &fibres.replace("fibres", "fibers"), side), "G010", "`fibers`"),
