@@ -246,7 +246,7 @@ fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)
     let angles = match &spec.fibres {
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
-            FibreAngles { nodes: nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect() }
+            FibreAngles::at_nodes(nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect())
         }
         FibresSpec::Field(field) => match &file {
             Some((file, geometry)) => file.angles(field, geometry)?,
