@@ -4,8 +4,8 @@ use super::run::{Tally, begin, finish};
 use super::terminal::{print, tell};
 use super::{Ending, Flags};
 use crate::cli::diagnostics::render_warning;
-use crate::error::Result;
-use crate::fibres::{FibreFit, data, fit, mesh};
+use crate::error::{Result, Warning};
+use crate::fibres::{FibreFit, data, fit, mesh, place};
 use crate::forward::Work;
 use crate::report::{self, FrameWarning};
 use crate::scene::{FibreBody, FibreProblem, GeometrySpec};
@@ -22,7 +22,7 @@ pub(super) fn run(problem: &FibreProblem, path: &Path, flags: &Flags) -> Result<
     let run = begin(&problem.name, &files, flags)?;
     let mut tally = Tally::default();
     let outcome = read.fit(problem).and_then(|fit| {
-        for warning in &fit.warnings {
+        for warning in read.warning.iter().chain(&fit.warnings) {
             if flags.shows_warnings() {
                 tell(&render_warning(warning, flags.colour()));
             }
@@ -43,13 +43,18 @@ pub(super) fn run(problem: &FibreProblem, path: &Path, flags: &Flags) -> Result<
 /// What is wrong with the files.
 pub(super) fn check(problem: &FibreProblem) -> Result<Ending> {
     let read = Read::new(problem)?;
+    let (fibres, sheets, outside) = place(problem, &read.mesh, &read.axes.all)?;
     print(&format!(
-        "{}: fibres; {} elements, {} nodes; {} measured axes in {} files\nok: no mistakes\n",
+        "{}: fibres; {} elements, {} nodes; {} measured axes in {} files, {} of them outside the mesh\n\
+         {} axes and {} sheets are used\nok: no mistakes\n",
         problem.name,
         read.mesh.elements(),
         read.mesh.nodes,
         read.axes.all.len(),
-        problem.data.len()
+        problem.data.len(),
+        outside.count,
+        fibres.all.len(),
+        sheets.all.len()
     ))?;
     Ok(Ending::Ok)
 }
@@ -59,12 +64,13 @@ struct Read {
     mesh: crate::mesh::Mesh,
     names: Vec<i64>,
     axes: data::Axes,
+    warning: Option<Warning>,
 }
 
 impl Read {
     fn new(problem: &FibreProblem) -> Result<Read> {
-        let (mesh, names) = mesh(&problem.body)?;
-        Ok(Read { mesh, names, axes: data::read(&problem.data)? })
+        let (mesh, names, warning) = mesh(&problem.body)?;
+        Ok(Read { mesh, names, axes: data::read(&problem.data)?, warning })
     }
 
     fn fit(&self, problem: &FibreProblem) -> Result<FibreFit> {

@@ -12,8 +12,9 @@ use rayon::prelude::*;
 /// The change of an angle from node to node that is thought possible where there are no data, radians: 45 degrees.
 const POSSIBLE: f64 = std::f64::consts::FRAC_PI_4;
 /// Angles with a standard deviation above this, radians, with nothing but the data and [`POSSIBLE`] to go by, are not
-/// determined by the data: 15 degrees.
-const DETERMINED: f64 = std::f64::consts::FRAC_PI_2 / 6.0;
+/// determined by the data: 25 degrees. A node without data has at least 45 / sqrt(8/3) = 27.6 degrees, 8/3 being the diagonal of
+/// the smoothness at a node of eight elements, even if all its neighbours are known.
+const DETERMINED: f64 = 25.0 / 180.0 * std::f64::consts::PI;
 /// The least standard deviation of the data that is believed, radians: a tenth of a degree.
 const LEAST_NOISE: f64 = 1.745e-3;
 
@@ -47,7 +48,7 @@ fn variances(search: &Search, normal: &[f64], lambda: f64, k: usize) -> Result<V
 /// Standard deviations for data whose noise has the standard deviation `noise` (radians, of an axis of weight 1).
 ///
 /// Determined is told by a second inverse whose smoothness stands for neighbours that differ by 45 degrees: near data it says what
-/// they say, away from them it grows beyond 15 degrees at the first node.
+/// they say, away from them it is beyond 25 degrees from the first node on.
 ///
 /// # Errors
 /// [`Error::FibreSystem`](crate::Error::FibreSystem).

@@ -19,7 +19,8 @@ const MOST_TOLD: usize = 20;
 /// # Errors
 /// [`Error::Io`]; every mistake in it, each with its line and column (the first 20).
 pub fn read(path: &Path) -> Result<Axes> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
+    let text =
+        std::fs::read_to_string(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
     parse(&text, &path.display().to_string())
 }
 
@@ -30,7 +31,8 @@ pub fn read(path: &Path) -> Result<Axes> {
 /// As [`read`].
 pub fn parse(text: &str, file: &str) -> Result<Axes> {
     let file: Arc<str> = file.into();
-    let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let mut lines =
+        text.trim_start_matches('\u{feff}').lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
     let (_, header) = lines.next().unwrap_or((0, ""));
     let names: Vec<&str> = header.split(',').map(str::trim).collect();
     let columns = columns(&names, header, &file)?;
@@ -76,7 +78,8 @@ pub fn parse(text: &str, file: &str) -> Result<Axes> {
                         0.0 => "a number that is 0 or more",
                         _ => "a number greater than 0",
                     };
-                    let found = if cells[column].is_empty() { "empty".into() } else { format!("\"{}\"", cells[column]) };
+                    let found =
+                        if cells[column].is_empty() { "empty".into() } else { format!("\"{}\"", cells[column]) };
                     mistakes.push(Error::WrongType {
                         key: names[column].into(),
                         expected: expected.into(),

@@ -7,6 +7,8 @@ use crate::scene::LossSpec;
 
 /// A step of every angle that is smaller than this ends the search, radians.
 const TOLERANCE: f64 = 1e-8;
+/// A step that lowers the sum by less than this part of it ends the search: it is a millionth of what the data leave open.
+const GAIN: f64 = 1e-12;
 /// The most halvings of a step.
 const HALVINGS: usize = 12;
 
@@ -80,7 +82,8 @@ impl Search<'_> {
     /// # Errors
     /// [`Error::FibreSystem`](crate::Error::FibreSystem).
     pub fn descend(&self, angles: &mut Angles, lambda: f64, most: usize) -> Result<Descent> {
-        let value = |sums: &Sums, angles: &Angles| sums.cost + lambda * roughness(self.corners, angles, self.sought).0;
+        let value =
+            |sums: &Sums, angles: &Angles| sums.cost + lambda * roughness(self.corners, angles, self.sought).0;
         let mut sums = self.sums(angles, |_| true);
         let mut now = value(&sums, angles);
         for steps in 0..most {
@@ -88,7 +91,7 @@ impl Search<'_> {
             let longest = step.iter().flatten().fold(0.0, |longest: f64, x| longest.max(x.abs()));
             // a step of more than a radian leaves the chart in which it was made
             let mut part = if longest > 1.0 { 1.0 / longest } else { 1.0 };
-            let mut better = false;
+            let (mut better, before) = (false, now);
             for _ in 0..HALVINGS {
                 let trial = self.moved(angles, &step, part);
                 let there = self.sums(&trial, |_| true);
@@ -100,8 +103,8 @@ impl Search<'_> {
                 }
                 part *= 0.5;
             }
-            if !better || longest < TOLERANCE {
-                return Ok(Descent { steps: steps + 1, converged: longest < 1e-4, sums });
+            if !better || longest < TOLERANCE || (part == 1.0 && before - now <= GAIN * before) {
+                return Ok(Descent { steps: steps + 1, converged: better || longest < 1e-4, sums });
             }
         }
         Ok(Descent { steps: most, converged: false, sums })

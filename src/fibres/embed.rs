@@ -195,6 +195,9 @@ pub fn recharted(mesh: &Mesh, renamed: &Mesh, samples: &Samples, shift: usize) -
 pub fn across(sheet: &Sample, [a, b, _]: [f64; 3]) -> Option<Sample> {
     let [x, y] = across_and_up(a, b, sheet.axis);
     let length = norm([x, y, 0.0]);
-    (length > 10.0_f64.to_radians().sin())
-        .then(|| Sample { axis: [x / length, y / length, 0.0], weight: sheet.weight * length * length, ..*sheet })
+    (length > 10.0_f64.to_radians().sin()).then(|| Sample {
+        axis: [x / length, y / length, 0.0],
+        weight: sheet.weight * length * length,
+        ..*sheet
+    })
 }

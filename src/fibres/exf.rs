@@ -16,8 +16,12 @@ pub fn read(path: &Path, field: Option<&str>) -> Result<Axes> {
     let name = match (field, &names[..]) {
         (Some(field), names) if names.iter().any(|name| name == field) => field,
         (None, [only]) => only,
-        (_, []) => return Err(wrong("no node or data point has `coordinates` and another field of 3 components".into())),
-        (Some(field), names) => return Err(wrong(format!("no field `{field}` of 3 components, but {}", names.join(", ")))),
+        (_, []) => {
+            return Err(wrong("no node or data point has `coordinates` and another field of 3 components".into()));
+        }
+        (Some(field), names) => {
+            return Err(wrong(format!("no field `{field}` of 3 components, but {}", names.join(", "))));
+        }
         (None, names) => return Err(wrong(format!("several fields of 3 components: {}", names.join(", ")))),
     };
     let mut axes = Axes::default();

@@ -3,13 +3,13 @@
 use super::branches::unwrap;
 use super::certainty::{at, certainty, errors, held_out};
 use super::data::Axis;
-use super::descent::Search;
-use super::embed::{Outside, Samples, across, angles_of, chart, embed, from_frame, frame, in_frame, recharted};
-use super::normal::{Angles, Corners, Pattern, smooth};
-use super::smoothness::{Tried, choose};
+use super::descent::{Descent, Search};
+use super::embed::{Outside, Samples, across, angles_of, chart, embed, frame, in_frame, recharted};
+use super::normal::{Angles, Corners, Pattern, roughness, smooth};
+use super::outcome::{ElementErrors, FibreFit, NodeAngles, Spread, warnings};
+use super::smoothness::{Trace, Tried, choose};
 use super::start::start;
 use crate::error::{Error, Result, Warning};
-use crate::math::tensor::Vector;
 use crate::mesh::block::block;
 use crate::mesh::cycled::cycled;
 use crate::mesh::element::{Trilinear, ends};
@@ -18,127 +18,35 @@ use crate::mesh::fibre_angles::{FibreAngles, axes};
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::model::build::host;
-use crate::scene::{
-    AnglesSpec, ExfSpec, FibreBody, FibreProblem, GeometrySpec, LossSpec, SmoothnessSpec,
-};
+use crate::scene::{AnglesSpec, ExfSpec, FibreBody, FibreProblem, GeometrySpec, LossSpec, SmoothnessSpec};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// The smoothness of the first search where it is chosen afterwards.
 const FIRST: f64 = 1e-6;
+/// The smoothness of the tensors of the start, and of the second start where data are sparse.
+const STARTS: [f64; 2] = [1e-3, 1e-1];
+/// The searches before the first where data are sparse.
+const SMOOTHER: [f64; 2] = [1e-2, 1e-4];
+/// Fewer axes per element than this are sparse.
+const SPARSE: usize = 30;
 /// The most steps of a search.
 const MOST_STEPS: usize = 60;
-/// Nodes whose fibre is so near to f3 have no certain angle A: |B| above 80 degrees.
-const NEAR_POLE: f64 = 80.0 / 180.0 * PI;
 
-/// A fitted field of fibre angles.
-#[derive(Debug, Clone)]
-pub struct FibreFit {
-    /// The mesh of the angles: that of the problem, its local directions renamed by `chart`.
-    pub mesh: Mesh,
-    /// Direction d of the mesh is direction (d + chart) mod 3 of the problem's.
-    pub chart: usize,
-    /// The angles.
-    pub angles: FibreAngles,
-    /// Per node.
-    pub nodes: Vec<NodeAngles>,
-    /// What became of points outside the mesh.
-    pub outside: Outside,
-    /// Per used axis, in the order of `samples`: the angle to the fitted fibre, radians.
-    pub errors: Vec<f64>,
-    /// The used axes.
-    pub samples: Samples,
-    /// Their errors.
-    pub spread: Spread,
-    /// Per element that has data.
-    pub elements: Vec<ElementErrors>,
-    /// Errors of axes against fits without them.
-    pub held_out: Option<Spread>,
-    /// Errors of sheet axes, where G was sought.
-    pub sheets: Option<Spread>,
-    /// The smoothness that was used, as in the problem file.
-    pub smoothness: f64,
-    /// What was tried, if it was chosen.
-    pub tried: Vec<Tried>,
-    /// Numbers that the data determine, of `unknowns`.
-    pub freedom: f64,
-    /// Angles that were sought.
-    pub unknowns: usize,
-    /// Standard deviation of the measurement along one direction on the sphere, radians, of an axis of weight 1.
-    pub noise: f64,
-    /// Gauss-Newton steps of all searches.
-    pub steps: usize,
-    /// Whether the last search converged.
-    pub converged: bool,
-    /// What is to be known about it.
-    pub warnings: Vec<Warning>,
-}
-
-/// The fitted angles of a node.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NodeAngles {
-    /// Its number in the problem: from 0 in a block, the identifier in an EX file.
-    pub name: i64,
-    /// mm.
-    pub position: Vector,
-    /// A, B, G, radians.
-    pub angles: [f64; 3],
-    /// Their standard deviations in the fit with its smoothness, radians; `None` for those that were not sought.
-    pub sd: [Option<f64>; 3],
-    /// Whether the data determine them.
-    pub determined: bool,
-    /// Whether they were given.
-    pub fixed: bool,
-}
-
-/// Angular errors in short, radians.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spread {
-    /// How many.
-    pub count: usize,
-    /// Root mean square.
-    pub rms: f64,
-    /// Half of them are smaller.
-    pub median: f64,
-    /// 95 of 100 are smaller.
-    pub p95: f64,
-    /// The greatest.
-    pub most: f64,
-}
-
-/// The errors in one element.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ElementErrors {
-    /// Its index.
-    pub element: usize,
-    /// The errors there.
-    pub spread: Spread,
-}
-
-impl Spread {
-    /// Of some errors; `None` of none.
-    pub fn of(errors: &[f64]) -> Option<Spread> {
-        let count = errors.len();
-        let mut sorted = errors.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let part = |part: f64| sorted[((count as f64 * part).ceil() as usize).clamp(1, count) - 1];
-        (count > 0).then(|| Spread {
-            count,
-            rms: (sorted.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt(),
-            median: part(0.5),
-            p95: part(0.95),
-            most: sorted[count - 1],
-        })
-    }
-}
-
-/// The mesh of a problem and the names of its nodes.
+/// The mesh of a problem, the names of its nodes, and the warning where the mesh can only come close to what its file
+/// holds.
 ///
 /// # Errors
 /// An EX file that cannot be read.
-pub fn mesh(body: &FibreBody) -> Result<(Mesh, Vec<i64>)> {
-    let exf = |spec: &ExfSpec| -> Result<(Mesh, Vec<i64>)> {
+pub fn mesh(body: &FibreBody) -> Result<(Mesh, Vec<i64>, Option<Warning>)> {
+    let mut warning = None;
+    let place = match body {
+        FibreBody::Mesh(spec) => &spec.place,
+        FibreBody::Muscle(spec) => &spec.place,
+    };
+    let mut exf = |spec: &ExfSpec| -> Result<(Mesh, Vec<i64>)> {
         let geometry = ExFile::read(&spec.path)?.geometry(spec.field.as_deref())?;
+        warning = geometry.warning(place);
         Ok((geometry.mesh, geometry.nodes))
     };
     let (mesh, names) = match body {
@@ -148,15 +56,13 @@ pub fn mesh(body: &FibreBody) -> Result<(Mesh, Vec<i64>)> {
         },
         FibreBody::Muscle(spec) => match &spec.geometry {
             GeometrySpec::Exf(spec) => exf(spec)?,
-            GeometrySpec::Block(spec) => {
-                (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), Vec::new())
-            }
+            GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), Vec::new()),
             // a muscle is one block: `blocks` is no key of it
             GeometrySpec::Blocks(_) => (Mesh::new(&Trilinear, Vec::new(), Vec::new()), Vec::new()),
         },
     };
     let names = if names.is_empty() { (0..mesh.nodes as i64).collect() } else { names };
-    Ok((mesh, names))
+    Ok((mesh, names, warning))
 }
 
 /// A corner of an element for each node.
@@ -170,16 +76,25 @@ fn corner_of_nodes(mesh: &Mesh) -> Vec<Option<MaterialPoint>> {
     found
 }
 
+/// Where the axes lie in a mesh: in the first list the fibres, in the second the sheets.
+///
+/// # Errors
+/// [`Error::NoAxes`] where none lies in the mesh.
+pub fn place(problem: &FibreProblem, mesh: &Mesh, data: &[Axis]) -> Result<(Samples, Samples, Outside)> {
+    let placed = embed(&Locator::new(mesh), data, problem.outside);
+    if placed.0.all.is_empty() {
+        let Outside { count, distance, .. } = placed.2;
+        return Err(Error::NoAxes { count, distance, place: Box::new(problem.place.clone()) });
+    }
+    Ok(placed)
+}
+
 /// Fits the angles of a mesh, whose nodes have the names `names`, to axes.
 ///
 /// # Errors
 /// [`Error::NoAxes`] where no axis lies in the mesh; a fixed node that is not there; [`Error::FibreSystem`].
 pub fn fit(problem: &FibreProblem, mesh: &Mesh, names: &[i64], data: &[Axis]) -> Result<FibreFit> {
-    let (as_is, sheets, outside) = embed(&Locator::new(mesh), data, problem.outside);
-    if as_is.all.is_empty() {
-        let place = Box::new(problem.place.clone());
-        return Err(Error::NoAxes { count: outside.count, distance: outside.distance, place });
-    }
+    let (as_is, sheets, outside) = place(problem, mesh, data)?;
     // a field without B stays in the surfaces that its user means
     let shift = if problem.angles == AnglesSpec::A { 0 } else { chart(mesh, &as_is) };
     let renamed = cycled(mesh, shift);
@@ -209,7 +124,8 @@ pub fn fit(problem: &FibreProblem, mesh: &Mesh, names: &[i64], data: &[Axis]) ->
     // sheets: an angle in the plane across the fitted fibre, found in the same way
     let mut sheet = None;
     if problem.angles == AnglesSpec::ABG && !sheets.all.is_empty() {
-        let usable = sheets.all.iter().filter(|one| main.corners.turns[one.element as usize].iter().all(|k| k % 2 == 0));
+        let usable =
+            sheets.all.iter().filter(|one| main.corners.turns[one.element as usize].iter().all(|k| k % 2 == 0));
         let turned: Vec<_> = usable
             .filter_map(|one| {
                 let [a, b] = at(&search, &main.angles, one);
@@ -284,9 +200,10 @@ fn fixed_angles(
     let (corners, new_corners) = (corner_of_nodes(mesh), corner_of_nodes(renamed));
     let (mut fixed, mut mistakes) = (BTreeMap::new(), Vec::new());
     for spec in &problem.fixed {
-        let node = names.iter().position(|name| *name == spec.node);
-        let places = node.and_then(|node| Some((node, corners[node]?, new_corners[node]?)));
-        let Some((node, old, new)) = places else {
+        // a node with several versions of its position is several nodes of the mesh
+        let named = (0..names.len()).filter(|node| names[*node] == spec.node);
+        let places: Vec<_> = named.filter_map(|node| Some((node, corners[node]?, new_corners[node]?))).collect();
+        if places.is_empty() {
             let (low, high) = (names.iter().min().copied().unwrap_or(0), names.iter().max().copied().unwrap_or(0));
             mistakes.push(Error::UnknownName {
                 kind: "node",
@@ -295,17 +212,19 @@ fn fixed_angles(
                 place: spec.place.clone(),
             });
             continue;
-        };
+        }
         let given = spec.angles_deg.map(f64::to_radians);
-        let angles = if std::ptr::eq(mesh, renamed) || mesh.corners == renamed.corners {
-            given
-        } else {
-            // corners of the same element: the first that holds the node
-            let [fibre, sheet, _] = axes(&mesh.jacobian(old), given);
-            let frame = frame(&renamed.jacobian(new));
-            angles_of(in_frame(&frame, fibre), Some(in_frame(&frame, sheet)))
-        };
-        fixed.insert(node, angles);
+        for (node, old, new) in places {
+            let angles = if mesh.corners == renamed.corners {
+                given
+            } else {
+                // corners of the same element: the first that holds the node
+                let [fibre, sheet, _] = axes(&mesh.jacobian(old), given);
+                let frame = frame(&renamed.jacobian(new));
+                angles_of(in_frame(&frame, fibre), Some(in_frame(&frame, sheet)))
+            };
+            fixed.insert(node, angles);
+        }
     }
     if mistakes.is_empty() { Ok(fixed) } else { Err(Error::all(mistakes)) }
 }
@@ -333,32 +252,64 @@ impl Fitted {
         fixed: BTreeMap<usize, [f64; 2]>,
         sought: usize,
     ) -> Result<Fitted> {
-        let mut angles = start(pattern, samples, plain, sought)?;
-        for (node, given) in &fixed {
-            angles[*node] = *given;
-        }
-        let first = fixed.keys().next().copied().unwrap_or(0);
-        let corners = unwrap(samples, plain, &mut angles, first);
-        let smooth = smooth(pattern, &corners, sought);
         let (smoothness, chosen) = match problem.smoothness {
             SmoothnessSpec::Weight(weight) => (weight, true),
             SmoothnessSpec::Gcv => (FIRST, false),
         };
-        let mut fitted = Fitted {
-            angles,
-            corners,
-            sought,
-            smooth,
-            smoothness,
-            tried: Vec::new(),
-            freedom: 0.0,
-            steps: 0,
-            converged: false,
+        let first = fixed.keys().next().copied().unwrap_or(0);
+        let begun = |smoothness: f64, unwraps: bool| -> Result<(Angles, Corners)> {
+            let mut angles = start(pattern, samples, plain, sought, smoothness)?;
+            fixed.iter().for_each(|(node, given)| angles[*node] = *given);
+            let corners = if unwraps { unwrap(samples, plain, &mut angles, first) } else { plain.clone() };
+            Ok((angles, corners))
+        };
+        let mut starts = vec![begun(STARTS[0], true)?];
+        let mut smoothnesses = vec![smoothness];
+        if samples.all.len() < SPARSE * samples.elements() {
+            // few data leave several valleys: go down from the smooth end, and from several places
+            smoothnesses = SMOOTHER.into_iter().filter(|smoother| *smoother > smoothness).collect();
+            smoothnesses.push(smoothness);
+            starts.push(begun(STARTS[0], false)?);
+            starts.push(begun(STARTS[1], true)?);
+            starts.push(begun(STARTS[1], false)?);
+            starts.dedup();
+        }
+        let mut best: Option<(f64, Fitted, Descent)> = None;
+        for (mut angles, corners) in starts {
+            let smooth = smooth(pattern, &corners, sought);
+            let search =
+                Search { pattern, samples, corners: &corners, loss: problem.loss, sought, fixed: is_fixed, smooth };
+            let mut steps = 0;
+            let mut end = None;
+            for smoothness in &smoothnesses {
+                let descent = search.descend(&mut angles, search.lambda(*smoothness), MOST_STEPS)?;
+                steps += descent.steps;
+                end = Some(descent);
+            }
+            let Some(end) = end else { continue };
+            let value = end.sums.cost + search.lambda(smoothness) * roughness(&corners, &angles, sought).0;
+            if best.as_ref().is_none_or(|(least, _, _)| value < *least) {
+                let (smooth, tried) = (search.smooth.clone(), Vec::new());
+                let fitted = Fitted {
+                    angles,
+                    corners,
+                    sought,
+                    smooth,
+                    smoothness,
+                    tried,
+                    freedom: 0.0,
+                    steps,
+                    converged: false,
+                };
+                best = Some((value, fitted, end));
+            }
+        }
+        let Some((_, mut fitted, mut end)) = best else {
+            return Err(Error::FibreSystem { message: "a value is not a number".into() });
         };
         let search = fitted.search(pattern, samples, is_fixed, problem.loss);
         let mut angles = fitted.angles.clone();
-        let mut end = search.descend(&mut angles, search.lambda(smoothness), MOST_STEPS)?;
-        let mut steps = end.steps;
+        let mut steps = fitted.steps;
         let (mut smoothness, mut tried) = (smoothness, Vec::new());
         let mut near = None;
         // the choice is made for the problem as it is linear here: twice, as it moves what it depends on
@@ -370,7 +321,7 @@ impl Fitted {
             end = search.descend(&mut angles, search.lambda(smoothness), MOST_STEPS)?;
             steps += end.steps;
         }
-        let trace = super::smoothness::Trace::new(&search, &end.sums);
+        let trace = Trace::new(&search, &end.sums);
         let freedom = trace.score(&search, &angles, &end.sums, smoothness)?.freedom;
         (fitted.angles, fitted.smoothness, fitted.freedom) = (angles, smoothness, freedom);
         (fitted.tried, fitted.steps, fitted.converged) = (tried, steps, end.converged);
@@ -407,50 +358,4 @@ fn fibre_angles(main: &Fitted, sheet: Option<&Fitted>) -> FibreAngles {
         }
     }
     FibreAngles { nodes, own }
-}
-
-fn warnings(fit: &FibreFit, problem: &FibreProblem) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let mut warn = |code, message: String, help: &str| {
-        let (place, help) = (Some(problem.place.clone()), Some(help.into()));
-        warnings.push(Warning { code, message, place, help });
-    };
-    if !fit.converged {
-        let message = format!("the fit of the fibre angles did not settle in {} steps", fit.steps);
-        warn("F006", message, "its last angles are written; a greater smoothness, or a robust loss with a greater scale, settles sooner");
-    }
-    let Outside { count, projected, distance: [nearest, farthest] } = fit.outside;
-    if count > 0 {
-        let message = format!(
-            "{count} measured axes lie outside the mesh, {nearest:.3} to {farthest:.3} mm from it; {projected} of them are used"
-        );
-        warn("K006", message, "write outside = { project_mm = .. } in [fibres] to use those that are nearer than that");
-    }
-    let undetermined = fit.nodes.iter().filter(|node| !node.determined).count();
-    if undetermined > 0 {
-        let message = format!(
-            "the data do not determine the angles of {undetermined} of {} nodes: what stands there continues their neighbours",
-            fit.nodes.len()
-        );
-        warn("F007", message, "see the column `determined` of tables/fibre_angles.csv");
-    }
-    let pole = fit.nodes.iter().filter(|node| node.determined && node.angles[1].abs() > NEAR_POLE).count();
-    if pole > 0 {
-        let message = format!("at {pole} nodes the fibre runs within 10 degrees of f3, where the angle A means little");
-        warn("F008", message, "give the mesh another third direction, or divide it");
-    }
-    if !fit.angles.own.is_empty() {
-        let message = format!(
-            "{} elements have angles of their own at some corners: on a way about them the fibre turns by half turns",
-            fit.angles.own.len()
-        );
-        warn("F009", message, "use the EX file: a list of angles per node cannot say this");
-    }
-    warnings
-}
-
-/// A measured axis in space, from its sample.
-pub fn measured(mesh: &Mesh, sample: &super::embed::Sample) -> (Vector, Vector) {
-    let at = MaterialPoint { element: sample.element as usize, xi: sample.xi };
-    (mesh.position(at), from_frame(&frame(&mesh.jacobian(at)), sample.axis))
 }

@@ -30,6 +30,8 @@ pub mod vtk;
 pub mod xml;
 
 mod fit;
+mod outcome;
 
 pub use data::{Axes, Axis};
-pub use fit::{ElementErrors, FibreFit, NodeAngles, Spread, fit, measured, mesh};
+pub use fit::{fit, mesh, place};
+pub use outcome::{ElementErrors, FibreFit, NodeAngles, Spread, measured};

@@ -7,15 +7,18 @@ use crate::error::Result;
 use crate::mesh::element::{Element, Trilinear};
 use rayon::prelude::*;
 
-/// The smoothness of the tensors, as of [`super::descent::Search`].
-const SMOOTHNESS: f64 = 1e-3;
-
 /// Angles (A, B) at the nodes, A within (-pi/2, pi/2]: the principal axes of the fitted tensors, in the plane (f1, f2) if only A
-/// is sought.
+/// is sought; the smoothness is as of [`super::descent::Search`].
 ///
 /// # Errors
 /// [`Error::FibreSystem`](crate::Error::FibreSystem).
-pub fn start(pattern: &Pattern, samples: &Samples, corners: &Corners, sought: usize) -> Result<Angles> {
+pub fn start(
+    pattern: &Pattern,
+    samples: &Samples,
+    corners: &Corners,
+    sought: usize,
+    smoothness: f64,
+) -> Result<Angles> {
     /// m m^T of an axis: 11, 22, 33, 12, 23, 13.
     fn tensor([x, y, z]: [f64; 3]) -> [f64; 6] {
         [x * x, y * y, z * z, x * y, y * z, x * z]
@@ -50,7 +53,7 @@ pub fn start(pattern: &Pattern, samples: &Samples, corners: &Corners, sought: us
         }
     }
     let smooth = smooth(pattern, corners, 1);
-    let lambda = SMOOTHNESS * samples.all.len() as f64 / samples.elements() as f64;
+    let lambda = smoothness * samples.all.len() as f64 / samples.elements() as f64;
     let factor = pattern.factor(&normal, lambda, &smooth[0], &vec![false; pattern.nodes()])?;
     let fitted: Vec<Vec<f64>> = right.iter().map(|right| solve(&factor, right)).collect();
     let at_node = |n: usize| {

@@ -74,7 +74,11 @@ fn axes(dataset: &Dataset, field: Option<&str>) -> std::result::Result<Axes, Str
             let points: Option<Vec<Vector>> = line.iter().map(|point| dataset.points.get(*point).copied()).collect();
             axes.add_trace(&points.ok_or("a line with a point that is not there")?, 1.0, group as u32);
         }
-        return if axes.all.is_empty() { Err("no field of vectors or tensors, and no lines".into()) } else { Ok(axes) };
+        return if axes.all.is_empty() {
+            Err("no field of vectors or tensors, and no lines".into())
+        } else {
+            Ok(axes)
+        };
     };
     let on_points = dataset.on_points.iter().any(|known| std::ptr::eq(known, array));
     let places: Vec<Vector> = if on_points {
@@ -273,14 +277,20 @@ impl<'a> Legacy<'a> {
                         let [name, components, places, kind] = parts[..] else {
                             return Err(format!("`{header}` where the name and size of an array belong"));
                         };
-                        let size = |word: &str| word.parse::<usize>().map_err(|_| format!("`{header}` without sizes"));
+                        let size =
+                            |word: &str| word.parse::<usize>().map_err(|_| format!("`{header}` without sizes"));
                         let (components, places) = (size(components)?, size(places)?);
                         let values = self.numbers(components.saturating_mul(places), &kind.to_lowercase())?;
                         self.keep(&mut dataset, on, Array { name: name.into(), components, values });
                     }
                 }
                 "METADATA" => while self.line().is_some_and(|line| !line.is_empty()) {},
-                _ => return Err(format!("`{}` where a keyword belongs", keyword.chars().take(40).collect::<String>())),
+                _ => {
+                    return Err(format!(
+                        "`{}` where a keyword belongs",
+                        keyword.chars().take(40).collect::<String>()
+                    ));
+                }
             }
         }
         if let (true, Some([x, y, z])) = (is_structured_points, grid.as_deref()) {

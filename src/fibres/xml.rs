@@ -61,7 +61,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<Dataset> {
     let split = bytes.windows(APPENDED.len()).position(|window| window == APPENDED);
     let head = std::str::from_utf8(&bytes[..split.unwrap_or(bytes.len())]).map_err(|_| "its head is not text")?;
     let rest = &bytes[split.unwrap_or(bytes.len())..];
-    let mut format = Format { big_endian: false, header: 4, compressed: false, appended: &[], appended_base64: false };
+    let mut format =
+        Format { big_endian: false, header: 4, compressed: false, appended: &[], appended_base64: false };
     if let Some(start) = rest.iter().position(|byte| *byte == b'>') {
         let tag = String::from_utf8_lossy(&rest[1..start]).into_owned();
         format.appended_base64 = Tag::parse(&tag).get("encoding") == Some("base64");

@@ -132,13 +132,24 @@ impl AnglesSpec {
     }
 }
 
+/// The value of a key of a table.
+fn entry<'n>(node: &'n Node, key: &str) -> Option<&'n Node> {
+    Some(&node.entries()?.iter().find(|entry| entry.key == key)?.node)
+}
+
 /// Whether a tree is a fit of fibres.
 pub(super) fn is_fibres(root: &Node) -> bool {
-    let entry = |node: &Node, key: &str| -> Option<Node> {
-        Some(node.entries()?.iter().find(|entry| entry.key == key)?.node.clone())
-    };
-    let kind = entry(root, "task").and_then(|task| entry(&task, "kind"));
+    let kind = entry(root, "task").and_then(|task| entry(task, "kind"));
     kind.is_some_and(|kind| matches!(&kind.value, Value::Text(kind) if kind == "fibres"))
+}
+
+/// The muscle that `[fibres]` names, and where.
+fn muscle_of(root: &Node) -> Option<(String, Place)> {
+    let node = entry(entry(root, "fibres")?, "muscle")?;
+    match &node.value {
+        Value::Text(name) => Some((name.clone(), node.place.clone())),
+        _ => None,
+    }
 }
 
 /// Reads a fit of fibres.
@@ -156,7 +167,8 @@ pub(super) fn fibres(
         let example = "[fibres]\n[[fibres.data]]\nfile = \"axes.csv\"\nunits = \"mm\"";
         let settings = file.required("fibres", example, |item| item.table(|table| settings(table, references)));
         let muscles = file.tables("muscle", |table| muscle(table, references));
-        let wanted = settings.as_ref().and_then(|settings| settings.1.clone());
+        // as it stands in the file, even where the rest of its table is mistaken
+        let wanted = muscle_of(root);
         let mesh_example = "[mesh]\nblock = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
         let body = match wanted {
             // a muscle needs no host to be fitted
@@ -168,7 +180,7 @@ pub(super) fn fibres(
                 .required("mesh", mesh_example, |item| item.table(|table| mesh(table, references)))
                 .map(FibreBody::Mesh),
         };
-        let Settings { angles, data, outside, smoothness, loss, folds, fixed, place } = settings?.0;
+        let Settings { angles, data, outside, smoothness, loss, folds, fixed, place } = settings?;
         let (name, body) = (name?, body?);
         Some(FibreProblem { name, body, angles, data, outside, smoothness, loss, folds, fixed, place })
     })
@@ -196,10 +208,9 @@ struct Settings {
     place: Place,
 }
 
-/// The table `[fibres]`, and the muscle that it names with its place.
-fn settings(table: &mut Table, references: &References) -> Option<(Settings, Option<(String, Place)>)> {
+/// The table `[fibres]`.
+fn settings(table: &mut Table, references: &References) -> Option<Settings> {
     let muscle = table.optional("muscle", |item| item.name());
-    let muscle_place = table.place_of("muscle");
     let angles = table.or("angles", AnglesSpec::AB, |item| {
         let words = [("A", "A"), ("B", "B"), ("G", "G")];
         let letters = item.list("a list of angles", |entry| entry.choice(&words, &[]))?.concat();
@@ -214,7 +225,8 @@ fn settings(table: &mut Table, references: &References) -> Option<(Settings, Opt
     let outside = table.or("outside", OutsideSpec::Drop, |item| match item.node.value {
         Value::Text(_) => item.choice(&[("drop", OutsideSpec::Drop)], &[]),
         _ => item.table(|table| {
-            let limit = table.required("project_mm", "outside = { project_mm = 1 }", |item| item.number(NOT_NEGATIVE));
+            let limit =
+                table.required("project_mm", "outside = { project_mm = 1 }", |item| item.number(NOT_NEGATIVE));
             limit.map(OutsideSpec::ProjectMm)
         }),
     });
@@ -251,7 +263,7 @@ fn settings(table: &mut Table, references: &References) -> Option<(Settings, Opt
         fixed: fixed?,
         place: table.place(),
     };
-    Some((settings, muscle?.map(|name| (name, muscle_place))))
+    muscle.map(|_| settings)
 }
 
 fn data(table: &mut Table, references: &References) -> Option<FibreDataSpec> {
@@ -260,7 +272,8 @@ fn data(table: &mut Table, references: &References) -> Option<FibreDataSpec> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("csv" | "vtk" | "vtu" | "vtp" | "exf") => Some(path),
-            _ => item.out_of_range(&format!("{:?}", path.display().to_string()), "a .csv, .vtk, .vtu, .vtp or .exf file"),
+            _ => item
+                .out_of_range(&format!("{:?}", path.display().to_string()), "a .csv, .vtk, .vtu, .vtp or .exf file"),
         }
     });
     let place = table.place_of("file");

@@ -26,8 +26,10 @@ impl ExFile {
     pub fn vector_fields(&self) -> Vec<String> {
         let has = |node: &&Node| node.get(POSITION).and_then(values).is_some();
         let fields = self.all_nodes().filter(has).flat_map(|node| node.iter());
-        let names: BTreeSet<&String> =
-            fields.filter(|(name, field)| *name != POSITION && values(field).is_some()).map(|(name, _)| name).collect();
+        let names: BTreeSet<&String> = fields
+            .filter(|(name, field)| *name != POSITION && values(field).is_some())
+            .map(|(name, _)| name)
+            .collect();
         names.into_iter().cloned().collect()
     }
 

@@ -33,9 +33,7 @@ fn yes(flag: bool) -> Cell<'static> {
 
 /// A row per node; an angle that was not sought is 0 and has no standard deviation.
 fn angles(fit: &FibreFit) -> String {
-    let mut rows = table(
-        "node,x_mm,y_mm,z_mm,a_deg,b_deg,g_deg,a_sd_deg,b_sd_deg,g_sd_deg,determined,fixed",
-    );
+    let mut rows = table("node,x_mm,y_mm,z_mm,a_deg,b_deg,g_deg,a_sd_deg,b_sd_deg,g_sd_deg,determined,fixed");
     for node in &fit.nodes {
         let name = node.name.to_string();
         let sd = node.sd.map(|sd| sd.map_or(Cell::Empty, degrees));
