@@ -347,6 +347,37 @@ fn outliers_are_outvoted() {
         "30 % outliers: median error {cauchy:.2} (Cauchy), {huber:.2} (Huber), {quadratic:.2} (quadratic) degrees"
     );
     assert!(cauchy < 3.0 && cauchy < huber && huber < quadratic);
+
+    // the standard deviations are those of repetitions under robust losses too
+    for loss in [LossSpec::CauchyDeg(8.0), LossSpec::HuberDeg(5.0)] {
+        let (mut told, mut values) = (0.0, vec![Vec::new(); mesh.nodes]);
+        for seed in 0..30 {
+            let mut random = Random::new(200 + seed);
+            let mut data = sampled(&mesh, &truth, 200, &mut random);
+            for axis in &mut data {
+                let outlier = random.next() < -0.4;
+                axis.fibre = if outlier {
+                    normalised(random.triple())
+                } else {
+                    disturbed(axis.fibre, 5.0 * DEGREE, &mut random)
+                };
+            }
+            let smoothness = SmoothnessSpec::Weight(1e-6);
+            let found = fitted(&FibreProblem { loss, smoothness, ..problem(AnglesSpec::AB) }, &mesh, &data);
+            for (values, node) in values.iter_mut().zip(&found.nodes) {
+                values.push(node.angles[0]);
+                told += node.sd[0].unwrap().powi(2);
+            }
+        }
+        let variance = |values: &Vec<f64>| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (values.len() - 1) as f64
+        };
+        let seen = values.iter().map(variance).sum::<f64>();
+        let [told, seen] = [told / 30.0, seen].map(|sum| (sum / mesh.nodes as f64).sqrt() / DEGREE);
+        println!("{loss:?}: sd of A {told:.3} told, {seen:.3} degrees seen");
+        assert!((told / seen - 1.0).abs() < 0.15, "{loss:?}");
+    }
 }
 
 #[test]

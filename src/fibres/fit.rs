@@ -113,7 +113,7 @@ pub fn fit(problem: &FibreProblem, mesh: &Mesh, names: &[i64], data: &[Axis]) ->
     let search = main.search(&pattern, &samples, &is_fixed, problem.loss);
     let sums = search.sums(&main.angles, |_| true);
     let lambda = search.lambda(main.smoothness);
-    let noise = (sums.squares / (sums.count - main.freedom).max(1.0)).sqrt();
+    let noise = sums.noise(main.freedom);
     let sure = certainty(&search, &sums, lambda, noise)?;
     let errors = errors(&search, &main.angles);
     let held_out = match problem.folds {
@@ -137,7 +137,7 @@ pub fn fit(problem: &FibreProblem, mesh: &Mesh, names: &[i64], data: &[Axis]) ->
             let plane = Fitted::new(problem, &pattern, &turned, &plain, &is_fixed, pick([2, 2]), 1)?;
             let search = plane.search(&pattern, &turned, &is_fixed, problem.loss);
             let sums = search.sums(&plane.angles, |_| true);
-            let noise = (sums.squares / (sums.count - plane.freedom).max(1.0)).sqrt();
+            let noise = sums.noise(plane.freedom);
             let sure = certainty(&search, &sums, search.lambda(plane.smoothness), noise)?;
             let spread = Spread::of(&super::certainty::errors(&search, &plane.angles));
             sheet = Some((plane, sure, spread));

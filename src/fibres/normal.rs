@@ -71,17 +71,22 @@ pub fn misfit([a, b]: [f64; 2], m: [f64; 3]) -> Misfit {
     Misfit { theta, along: [u * scale, v * scale], cosine: cb }
 }
 
-/// rho(theta) and its weight rho'(theta) / (2 theta).
-pub fn loss(spec: LossSpec, theta: f64) -> (f64, f64) {
+/// rho(theta), its weight omega = rho'(theta) / (2 theta), and omega'(theta) / theta.
+pub fn loss(spec: LossSpec, theta: f64) -> [f64; 3] {
     match spec {
-        LossSpec::Quadratic => (theta * theta, 1.0),
+        LossSpec::Quadratic => [theta * theta, 1.0, 0.0],
         LossSpec::HuberDeg(scale) => {
             let k = scale.to_radians();
-            if theta <= k { (theta * theta, 1.0) } else { (2.0 * k * theta - k * k, k / theta) }
+            if theta <= k {
+                [theta * theta, 1.0, 0.0]
+            } else {
+                [2.0 * k * theta - k * k, k / theta, -k / theta.powi(3)]
+            }
         }
         LossSpec::CauchyDeg(scale) => {
             let k2 = scale.to_radians().powi(2);
-            (k2 * (theta * theta / k2).ln_1p(), 1.0 / (1.0 + theta * theta / k2))
+            let omega = 1.0 / (1.0 + theta * theta / k2);
+            [k2 * (theta * theta / k2).ln_1p(), omega, -2.0 * omega * omega / k2]
         }
     }
 }
@@ -93,8 +98,12 @@ pub struct Sums {
     pub cost: f64,
     /// Sum of weighted squares of what the sought angles can mend, radians squared.
     pub squares: f64,
-    /// Sum of weights, times the number of sought angles.
+    /// Sum of weights w omega, times the number of sought angles.
     pub count: f64,
+    /// Sum of w (omega r)^2: how much the forces on the angles scatter.
+    pub scatter: f64,
+    /// Sum of w d(omega r)/dr: how stiff these forces are.
+    pub stiffness: f64,
     /// For each sought angle the matrix in the places of the [`Pattern`].
     pub normal: Vec<Vec<f64>>,
     /// For each sought angle the right side, per node.
@@ -102,11 +111,21 @@ pub struct Sums {
 }
 
 impl Sums {
+    /// The standard deviation that, over the weighted normal equations, gives that of the angles, radians: of the measurement
+    /// along one direction where the loss is quadratic; of a robust loss scatter x count / stiffness^2 is the variance of an
+    /// M-estimator (Huber 1981, section 7.6) brought to the weights w omega. `freedom`: numbers that the data determine.
+    pub fn noise(&self, freedom: f64) -> f64 {
+        let free = self.count / (self.count - freedom).max(1.0);
+        (free * self.scatter * self.count).sqrt() / self.stiffness.max(f64::MIN_POSITIVE)
+    }
+
     /// Adds `factor` times other sums.
     pub fn add(&mut self, factor: f64, other: &Sums) {
         self.cost += factor * other.cost;
         self.squares += factor * other.squares;
         self.count += factor * other.count;
+        self.scatter += factor * other.scatter;
+        self.stiffness += factor * other.stiffness;
         let pairs = self.normal.iter_mut().zip(&other.normal).chain(self.gradient.iter_mut().zip(&other.gradient));
         pairs.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from));
     }
@@ -115,7 +134,8 @@ impl Sums {
 /// The sums of one element.
 #[derive(Clone, Copy)]
 struct ElementSums {
-    scalars: [f64; 3],
+    /// cost, squares, count, scatter, stiffness
+    scalars: [f64; 5],
     normal: [[[f64; 8]; 8]; 2],
     gradient: [[f64; 8]; 2],
 }
@@ -240,7 +260,7 @@ fn of_element(
     sought: usize,
     take: impl Fn(&Sample) -> bool,
 ) -> ElementSums {
-    let mut sums = ElementSums { scalars: [0.0; 3], normal: [[[0.0; 8]; 8]; 2], gradient: [[0.0; 8]; 2] };
+    let mut sums = ElementSums { scalars: [0.0; 5], normal: [[[0.0; 8]; 8]; 2], gradient: [[0.0; 8]; 2] };
     for sample in samples.iter().filter(|sample| take(sample)) {
         let psi = Trilinear.values(sample.xi);
         let mut at = [0.0; 2];
@@ -249,13 +269,16 @@ fn of_element(
             at[1] += psi[c] * corners[c][1];
         }
         let found = misfit(at, sample.axis);
-        let (rho, part) = loss(loss_spec, found.theta);
+        let [rho, part, bend] = loss(loss_spec, found.theta);
         let weight = sample.weight * part;
         sums.scalars[0] += sample.weight * rho;
         sums.scalars[2] += weight * sought as f64;
         let rates = [found.cosine, 1.0];
         for k in 0..sought {
-            sums.scalars[1] += weight * found.along[k] * found.along[k];
+            let square = found.along[k] * found.along[k];
+            sums.scalars[1] += weight * square;
+            sums.scalars[3] += weight * part * square;
+            sums.scalars[4] += sample.weight * (part + bend * square);
             let (force, stiffness) = (weight * rates[k] * found.along[k], weight * rates[k] * rates[k]);
             for i in 0..8 {
                 sums.gradient[k][i] += force * psi[i];
@@ -292,6 +315,8 @@ pub fn sums(
         cost: 0.0,
         squares: 0.0,
         count: 0.0,
+        scatter: 0.0,
+        stiffness: 0.0,
         normal: vec![vec![0.0; pattern.len()]; sought],
         gradient: vec![vec![0.0; pattern.nodes()]; sought],
     };
@@ -308,6 +333,8 @@ pub fn sums(
             sums.cost += part.scalars[0];
             sums.squares += part.scalars[1];
             sums.count += part.scalars[2];
+            sums.scatter += part.scalars[3];
+            sums.stiffness += part.scalars[4];
             for k in 0..sought {
                 for i in 0..8 {
                     sums.gradient[k][corners.nodes[e][i]] += part.gradient[k][i];

@@ -45,7 +45,8 @@ pub struct FibreFit {
     pub freedom: f64,
     /// Angles that were sought.
     pub unknowns: usize,
-    /// Standard deviation of the measurement along one direction on the sphere, radians, of an axis of weight 1.
+    /// Standard deviation of the measurement along one direction on the sphere, radians, of an axis of weight 1; see
+    /// [`super::normal::Sums::noise`] for robust losses.
     pub noise: f64,
     /// Gauss-Newton steps of all searches.
     pub steps: usize,

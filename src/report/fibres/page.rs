@@ -47,7 +47,8 @@ pub(super) fn page(problem: &FibreProblem, fit: &FibreFit, empty: usize) -> Stri
         "\nsmoothness {:.3e} {chosen}, {loss}: the data determine {:.1} of {} numbers\n",
         fit.smoothness, fit.freedom, fit.unknowns
     );
-    text += &format!("noise of a measurement: {:.4} degrees along each direction\n", fit.noise.to_degrees());
+    text +=
+        &format!("noise of an axis that counts fully: {:.4} degrees along each direction\n", fit.noise.to_degrees());
     let sure: Vec<f64> = fit
         .nodes
         .iter()
