@@ -26,7 +26,7 @@ fn main() -> std::io::Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/fibres");
     let mut state = 2013;
     let mut axes = "x,y,z,vx,vy,vz\n".to_string();
-    for _ in 0..900 {
+    for _ in 0..2000 {
         let x = [60.0, 40.0, 8.0].map(|size| size * random(&mut state));
         // nothing was measured in a corner
         if x[0] > 38.0 && x[1] > 18.0 {
