@@ -7,7 +7,7 @@
 use risorius::fit::Fit;
 use risorius::forward::{Drive, Solver};
 use risorius::markers::{ReadOptions, read};
-use risorius::math::factor::Factor;
+use risorius::math::factor::{Factor, Precision};
 use risorius::model::build::build;
 use risorius::model::{Model, Workspace};
 use risorius::scene::Scene;
@@ -121,12 +121,15 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
     let stiffness = median(9, || drop(model.evaluate(&found.state, Want::Stiffness, None, &mut workspace)));
     let mut tangent = model.tangent();
     let assemble = median(9, || model.assemble(&workspace, &mut tangent));
-    let mut factor = Factor::new(model.symbolic().clone())?;
-    let mut failed = None;
-    let factorise = median(5, || failed = factor.refactor(&tangent.matrix).err());
-    if let Some(error) = failed {
-        return Err(error.into());
-    }
+    let factored = |precision: Precision| -> risorius::Result<(Factor, f64)> {
+        let mut factor = Factor::new(model.symbolic().clone(), precision)?;
+        factor.refactor(&tangent.matrix)?;
+        let mut failed = None;
+        let seconds = median(5, || failed = factor.refactor(&tangent.matrix).err());
+        failed.map_or(Ok((factor, seconds)), Err)
+    };
+    let (mut factor, factorise) = factored(Precision::Double)?;
+    let (mut single, factorise_single) = factored(Precision::Single)?;
     let n = model.numbering().unknowns();
     let solve = |columns: usize, factor: &mut Factor| {
         median(5, || {
@@ -135,6 +138,7 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
         })
     };
     let (one, thirty) = (solve(1, &mut factor), solve(30, &mut factor));
+    let one_single = solve(1, &mut single);
     let flops = model.factor_flops();
 
     let sizes = |model: &Model| (model.mesh().elements(), model.mesh().nodes, model.numbering().unknowns());
@@ -162,7 +166,13 @@ fn stages(name: &str, text: &str) -> Result<(), Box<dyn std::error::Error>> {
         flops / factorise / 1e9,
         flops / 1e9
     );
+    println!(
+        "  the same in single precision         {:8.2} ms   {:6.2} of it",
+        1e3 * factorise_single,
+        factorise_single / factorise
+    );
     println!("  solve, 1 right-hand side             {:8.2} ms", 1e3 * one);
+    println!("  solve with the one in single         {:8.2} ms", 1e3 * one_single);
     println!(
         "  solve, 30 right-hand sides           {:8.2} ms   {:6.2} of a factorisation",
         1e3 * thirty,

@@ -97,13 +97,15 @@ fn for_small_loads_it_is_the_difference_to_the_halved_mesh() {
                   fibre_angles_deg = [20, 0, 0]\n\
                   blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0, p2 = 6.6 }\n\
                   [controls]\nm = 1e-8\n";
-    for pressure in ["trilinear", "discontinuous-trilinear"] {
-        let set = [&format!("tissue.pressure=\"{pressure}\"") as &str, "muscle.m.gauss=4"];
+    for (pressure, cut) in [("trilinear", false), ("discontinuous-trilinear", true)] {
+        let set = [&format!("tissue.pressure=\"{pressure}\""), "muscle.m.gauss=4", &format!("muscle.m.cut={cut}")];
         let scene = scene(&[CLAMP, load, muscle].concat(), &set);
         let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
         let settings = Settings { tolerance: 1e-12, ..Settings::default() };
         let found = solved(&built, &scene, settings);
         let halved = halved(&scene, &built);
+        let points = |built: &Built| built.model.muscles().map(|(_, muscle)| muscle.points().len()).sum::<usize>();
+        assert!(points(&halved.built) > points(&built), "{pressure}: too few points");
         let mut estimator = Estimator::new(&built.model, &halved, settings).expect("it fits");
         let corrected = estimator.corrected(&found.state).unwrap_or_else(|error| panic!("{error}"));
         let better = solved(&halved.built, &scene, settings);

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use risorius::Error;
-use risorius::math::factor::{Factor, Inertia, Symbolic};
+use risorius::math::factor::{Factor, Inertia, Precision, Symbolic};
 use risorius::math::ordering::Ordering;
 use risorius::math::sparse::{BlockPattern, SymmetricMatrix};
 
@@ -139,8 +139,12 @@ impl Grid {
 }
 
 fn factored(grid: &Grid, matrix: &SymmetricMatrix) -> Factor {
+    factored_in(grid, matrix, Precision::Double)
+}
+
+fn factored_in(grid: &Grid, matrix: &SymmetricMatrix, precision: Precision) -> Factor {
     let symbolic = Symbolic::new(matrix.pattern.clone(), &grid.ordering(&matrix.pattern)).unwrap();
-    let mut factor = Factor::new(symbolic).unwrap();
+    let mut factor = Factor::new(symbolic, precision).unwrap();
     factor.refactor(matrix).unwrap();
     factor
 }
@@ -247,6 +251,29 @@ fn large_systems_are_solved_to_rounding_with_the_right_inertia() {
         assert!(quality.residual <= 1e-12 && quality.sweeps <= 3, "{quality:?}");
         assert!(difference(&product, &b) <= 1e-12 * norm(&b));
         assert_eq!(factor.inertia(), grid.expected_inertia());
+    }
+}
+
+#[test]
+fn a_factor_in_single_precision_gives_the_same_solutions_with_more_sweeps() {
+    for (cells, pressure) in [([12, 8, 1], Pressure::Continuous), ([8, 6, 2], Pressure::Discontinuous)] {
+        let grid = Grid::new(cells, pressure, |[_, _, k]| if k == 0 { 12 } else { 24 });
+        let matrix = grid.matrix(&grid.pattern(), 2, 100.0, 1e5);
+        let mut b = vec![0.0; 3 * matrix.pattern.n()];
+        matrix.multiply_columns(&Random(3).vector(b.len()), &mut b, 3);
+        let [double, single] = [Precision::Double, Precision::Single].map(|precision| {
+            let mut factor = factored_in(&grid, &matrix, precision);
+            let mut x = b.clone();
+            let quality = factor.solve(&matrix, &mut x, 3, 1e-13).unwrap();
+            assert!(quality.residual <= 1e-13, "{precision:?}: {quality:?}");
+            // over five decades single precision cannot tell small eigenvalues from zero, but takes none for negative
+            let (inertia, expected) = (factor.inertia(), grid.expected_inertia());
+            assert_eq!(inertia.negative, expected.negative, "{precision:?}");
+            assert_eq!(inertia.positive + inertia.zero, expected.positive, "{precision:?}");
+            (x, quality.sweeps)
+        });
+        assert!(difference(&double.0, &single.0) <= 1e-9 * norm(&double.0));
+        assert!(single.1 > double.1 && single.1 <= 8, "{} and {} sweeps", single.1, double.1);
     }
 }
 
@@ -383,7 +410,8 @@ fn values_that_are_not_finite_are_refused() {
 fn a_singular_matrix_is_refused_and_names_an_unknown() {
     let grid = Grid::new([2, 1, 1], Pressure::Continuous, |_| 24);
     let pattern = grid.pattern();
-    let mut factor = Factor::new(Symbolic::new(pattern.clone(), &grid.ordering(&pattern)).unwrap()).unwrap();
+    let mut factor =
+        Factor::new(Symbolic::new(pattern.clone(), &grid.ordering(&pattern)).unwrap(), Precision::Double).unwrap();
     let refused = factor.refactor(&SymmetricMatrix::zeros(pattern.clone()));
     assert!(matches!(refused, Err(Error::Singular { unknown }) if unknown < pattern.n()), "{refused:?}");
 }
@@ -393,7 +421,7 @@ fn the_empty_system_is_solved() {
     let pattern = Arc::new(BlockPattern::new(&[0, 0, 0], [[0usize, 1].as_slice()]));
     let matrix = SymmetricMatrix::zeros(pattern.clone());
     let ordering = Ordering::new(&pattern, &[]);
-    let mut factor = Factor::new(Symbolic::new(pattern, &ordering).unwrap()).unwrap();
+    let mut factor = Factor::new(Symbolic::new(pattern, &ordering).unwrap(), Precision::Double).unwrap();
     factor.refactor(&matrix).unwrap();
     let quality = factor.solve(&matrix, &mut [], 4, 1e-12).unwrap();
     assert_eq!((quality.residual, quality.sweeps, factor.inertia()), (0.0, 0, Inertia::default()));

@@ -503,7 +503,7 @@ fn regions_and_points_must_lie_in_the_host() {
 const CONTACTS: &str = r#"
 [[sliding]]
 face = "xi3=0"
-surface = { reference = true }
+surface = { reference = "xi3=1" }
 law = { augmented = { kpa_per_mm = 50, gap_mm = 1e-3 } }
 [[sliding]]
 name = "pole"
@@ -571,7 +571,7 @@ fn contacts_are_read_and_locked() {
     assert_eq!(scene.lock(), again.lock());
 
     let mistakes = [
-        ("reference = true", "reference = false", "C005"),
+        ("reference = \"xi3=1\"", "reference = false", "C005"),
         ("normal = [0, 0, -1]", "normal = [0, 0, 0]", "C005"),
         ("to_mm = [90, 20, 10]", "to_mm = [90, 0, 10]", "C005"),
         ("radius_mm = 9,", "radius_mm = 0,", "C005"),
@@ -721,7 +721,13 @@ fn curves_are_linear_between_rows_and_constant_outside() {
     let curves = Curves::parse("time_s, risorius.L,slab\n0,0,1\n\n2, 0.5,0\n", "c.csv", &muscles).unwrap();
     assert_eq!(curves.at("risorius.L", 1.0), Some(0.25));
     assert_eq!((curves.at("slab", -1.0), curves.at("slab", 9.0), curves.at("x", 0.0)), (Some(1.0), Some(0.0), None));
+    // what a fit leaves drives a forward run
+    let left = "frame,time_s,slab,slab_sd\n0,0,0.5,1e-4\n1,1,0.25,\n";
+    let curves = Curves::parse(left, "activations.csv", &muscles).unwrap();
+    assert_eq!((curves.names.len(), curves.at("slab", 1.0)), (1, Some(0.25)));
     for (text, code, line, column) in [
+        ("frame,time_s,slab_sd,slap_sd\n0,0,1,1\n", "C009", 1, 22),
+        ("frame,time_s,slab\n0,0\n", "C007", 2, 1),
         ("time_s,slab\n0,x\n", "C004", 2, 3),
         ("time_s,slab\n0,\n", "C004", 2, 3),
         ("time_s,slab\n0,nan\n", "C005", 2, 3),

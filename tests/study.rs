@@ -32,6 +32,7 @@ kind = "study"
 problem = "problem.toml"
 measure = "probes"
 target = 0.1
+set = { "tissue.gauss" = 4 }
 repetitions = 2
 reference = { set = { "mesh.block.elements" = [8, 1, 1] } }
 [[study.vary]]
@@ -135,6 +136,7 @@ fn a_study_lists_every_variant_and_its_settings_serve_a_run() {
     assert!(errors.contains(&format!("accuracy: {} for probes", names[row])), "{errors}");
     let lock = std::fs::read_to_string(path.join("best/problem.lock.toml")).unwrap();
     assert!(lock.contains(&format!("elements = {}", names[row].trim_start_matches("host = "))), "{lock}");
+    assert!(lock.contains("gauss = 4"), "what is set in all variants belongs to the answer");
     let (exit, _, errors) = risorius(path, &["run", "problem.toml", "--accuracy", "1e-9mm"]);
     assert_eq!(exit, 3);
     assert!(errors.contains("error[C023]") && errors.contains("add finer variants"), "{errors}");
@@ -156,6 +158,7 @@ fn mistakes_of_a_study_are_told() {
         ("problem = \"problem.toml\"", "problem = \"none.toml\"", "C012", "none.toml"),
         ("values = [[1, 1, 1], [2, 1, 1], [4, 1, 1]]", "values = []", "C007", "at least one value"),
         ("values = [[1, 1, 1], [2, 1, 1], [4, 1, 1]]", "", "C003", "values"),
+        ("name = \"host\"", "labels = [\"coarse\"]", "C007", "3, one for each value"),
         ("key = \"mesh.block.elements\"", "without = \"contact.table\"", "C011", "key with values"),
         ("key = \"mesh.block.elements\"", "key = \"mesh.block.element\"", "C002", "did you mean `elements`"),
         (

@@ -1,8 +1,11 @@
-"""Draws frames of a run to a PNG: the deformed skin, muscles coloured by stretch, measured markers and residuals.
+"""Draws frames of runs side by side to a PNG: the deformed skin, muscles coloured by stretch, measured markers and residuals.
 
     pip install vtk
-    python3 examples/python/picture.py runs/beam-0001 0,14,26 problems/beam/beam.png
+    python3 examples/python/picture.py runs/beam-0001:0 runs/beam-0001:14 runs/beam-0001:26 problems/beam/beam.png
+
+A frame may have a caption: runs/figure_1-0001:0="36 degrees".
 """
+import os
 import sys
 import vtk
 
@@ -40,12 +43,19 @@ def actor(data, opacity=1.0, colour=None, array=None, span=None, size=None):
     return result
 
 
-def main(run, frames, png):
+def frame_of(argument):
+    """run:frame or run:frame=caption"""
+    run, _, rest = argument.partition(":")
+    frame, _, caption = rest.partition("=")
+    return run, int(frame), caption or f"frame {frame}"
+
+
+def main(frames, png):
     window = vtk.vtkRenderWindow()
     window.SetOffScreenRendering(1)
     window.SetSize(440 * len(frames), 330)
     window.SetMultiSamples(8)
-    for k, frame in enumerate(frames):
+    for k, (run, frame, caption) in enumerate(frames):
         renderer = vtk.vtkRenderer()
         renderer.SetBackground(1, 1, 1)
         renderer.SetViewport(k / len(frames), 0, (k + 1) / len(frames), 1)
@@ -62,11 +72,9 @@ def main(run, frames, png):
         renderer.AddActor(actor(edges.GetOutput(), 0.25, (0.45, 0.3, 0.25)))
         muscles = read(f"{run}/view/muscles_{frame:04}.vtu")
         renderer.AddActor(actor(muscles, array="stretch", span=(0.6, 1.05), size=7))
-        try:
-            markers = read(f"{run}/view/markers_{frame:04}.vtu")
-            renderer.AddActor(actor(markers, colour=(0.05, 0.05, 0.05), size=9))
-        except Exception:
-            pass
+        markers = f"{run}/view/markers_{frame:04}.vtu"
+        if os.path.exists(markers):
+            renderer.AddActor(actor(read(markers), colour=(0.05, 0.05, 0.05), size=9))
         camera = renderer.GetActiveCamera()
         camera.SetPosition(30, -150, 60)
         camera.SetFocalPoint(28, 10, 14)
@@ -74,7 +82,7 @@ def main(run, frames, png):
         camera.SetViewAngle(23)
         renderer.ResetCameraClippingRange()
         text = vtk.vtkTextActor()
-        text.SetInput(f"frame {frame}")
+        text.SetInput(caption)
         text.GetTextProperty().SetColor(0, 0, 0)
         text.GetTextProperty().SetFontSize(20)
         text.SetPosition(12, 10)
@@ -92,4 +100,4 @@ def main(run, frames, png):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], [int(f) for f in sys.argv[2].split(",")], sys.argv[3])
+    main([frame_of(argument) for argument in sys.argv[1:-1]], sys.argv[-1])

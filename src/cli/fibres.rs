@@ -86,7 +86,8 @@ fn inputs(problem: &FibreProblem) -> impl Iterator<Item = &Path> {
     };
     let mesh = match geometry {
         GeometrySpec::Exf(spec) => Some(spec.path.as_path()),
-        GeometrySpec::Block(_) | GeometrySpec::Blocks(_) => None,
+        GeometrySpec::Face(spec) => spec.landmarks.as_deref(),
+        _ => None,
     };
     mesh.into_iter().chain(problem.data.iter().map(|data| data.file.as_path()))
 }

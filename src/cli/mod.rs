@@ -10,6 +10,7 @@ mod fibres;
 mod fit;
 mod forward;
 mod inspect;
+mod new;
 mod noticed;
 mod prepare;
 mod problem;
@@ -49,6 +50,14 @@ enum Command {
     Check {
         /// problem.toml
         problem: Option<PathBuf>,
+    },
+    /// Write a problem to start from
+    New {
+        /// The folder for its files
+        folder: PathBuf,
+        /// What it is about
+        #[arg(long, value_enum, default_value_t = Template::Face)]
+        template: Template,
     },
     /// What is in a marker recording
     Inspect {
@@ -96,6 +105,13 @@ struct Flags {
     /// Progress of long work
     #[arg(long, global = true, value_enum, default_value_t = Progress::Auto)]
     progress: Progress,
+}
+
+/// What a new problem is about.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Template {
+    /// The face with its fifteen pairs of muscles
+    Face,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -213,6 +229,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         None => run::run(None, &cli.flags),
         Some(Command::Run { problem }) => run::run(problem.as_deref(), &cli.flags),
         Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
+        Some(Command::New { folder, template }) => new::new(folder, *template),
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
     }
 }

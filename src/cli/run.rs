@@ -190,7 +190,8 @@ fn input_files(source: &Source) -> Vec<PathBuf> {
     let geometries = std::iter::once(&scene.mesh.geometry).chain(scene.muscles.iter().map(|muscle| &muscle.geometry));
     let meshes = geometries.filter_map(|geometry| match geometry {
         GeometrySpec::Exf(exf) => Some(exf.path.clone()),
-        GeometrySpec::Block(_) | GeometrySpec::Blocks(_) => None,
+        GeometrySpec::Face(face) => face.landmarks.clone(),
+        GeometrySpec::Block(_) | GeometrySpec::Blocks(_) | GeometrySpec::FaceMuscle(_) => None,
     });
     let mut files: Vec<PathBuf> = curves.chain(meshes).chain(markers.map(|f| f.markers.clone())).collect();
     files.sort();

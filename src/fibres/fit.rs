@@ -10,15 +10,14 @@ use super::outcome::{ElementErrors, FibreFit, NodeAngles, Spread, warnings};
 use super::smoothness::{Trace, Tried, choose};
 use super::start::start;
 use crate::error::{Error, Result, Warning};
-use crate::mesh::block::block;
 use crate::mesh::cycled::cycled;
-use crate::mesh::element::{Trilinear, ends};
+use crate::mesh::element::ends;
 use crate::mesh::exf::ExFile;
 use crate::mesh::fibre_angles::{FibreAngles, axes};
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
-use crate::model::build::host;
-use crate::scene::{AnglesSpec, ExfSpec, FibreBody, FibreProblem, GeometrySpec, LossSpec, SmoothnessSpec};
+use crate::model::build::{host, muscle_mesh};
+use crate::scene::{AnglesSpec, FibreBody, FibreProblem, GeometrySpec, LossSpec, SmoothnessSpec};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -39,27 +38,19 @@ const MOST_STEPS: usize = 60;
 /// # Errors
 /// An EX file that cannot be read.
 pub fn mesh(body: &FibreBody) -> Result<(Mesh, Vec<i64>, Option<Warning>)> {
-    let mut warning = None;
-    let place = match body {
-        FibreBody::Mesh(spec) => &spec.place,
-        FibreBody::Muscle(spec) => &spec.place,
+    let (geometry, place) = match body {
+        FibreBody::Mesh(spec) => (&spec.geometry, &spec.place),
+        FibreBody::Muscle(spec) => (&spec.geometry, &spec.place),
     };
-    let mut exf = |spec: &ExfSpec| -> Result<(Mesh, Vec<i64>)> {
-        let geometry = ExFile::read(&spec.path)?.geometry(spec.field.as_deref())?;
-        warning = geometry.warning(place);
-        Ok((geometry.mesh, geometry.nodes))
-    };
-    let (mesh, names) = match body {
-        FibreBody::Mesh(spec) => match &spec.geometry {
-            GeometrySpec::Exf(spec) => exf(spec)?,
-            GeometrySpec::Block(_) | GeometrySpec::Blocks(_) => (host(spec)?, Vec::new()),
-        },
-        FibreBody::Muscle(spec) => match &spec.geometry {
-            GeometrySpec::Exf(spec) => exf(spec)?,
-            GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), Vec::new()),
-            // a muscle is one block: `blocks` is no key of it
-            GeometrySpec::Blocks(_) => (Mesh::new(&Trilinear, Vec::new(), Vec::new()), Vec::new()),
-        },
+    let (mesh, names, warning) = match (geometry, body) {
+        // of any element, with the names of its nodes
+        (GeometrySpec::Exf(spec), _) => {
+            let geometry = ExFile::read(&spec.path)?.geometry(spec.field.as_deref())?;
+            let warning = geometry.warning(place);
+            (geometry.mesh, geometry.nodes, warning)
+        }
+        (_, FibreBody::Mesh(spec)) => (host(spec)?, Vec::new(), None),
+        (_, FibreBody::Muscle(spec)) => (muscle_mesh(spec)?.0, Vec::new(), None),
     };
     let names = if names.is_empty() { (0..mesh.nodes as i64).collect() } else { names };
     Ok((mesh, names, warning))
@@ -207,7 +198,7 @@ fn fixed_angles(
             let (low, high) = (names.iter().min().copied().unwrap_or(0), names.iter().max().copied().unwrap_or(0));
             mistakes.push(Error::UnknownName {
                 kind: "node",
-                name: spec.node.to_string().into(),
+                name: spec.node.to_string(),
                 help: format!("the nodes of the mesh are numbered from {low} to {high}"),
                 place: spec.place.clone(),
             });

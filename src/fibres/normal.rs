@@ -341,7 +341,7 @@ pub fn sums(
                     for j in 0..8 {
                         // once per pair of corners; a collapsed pair of corners is one node and counts both ways
                         let (p, q) = (corners.nodes[e][i], corners.nodes[e][j]);
-                        if p > q || p == q {
+                        if p >= q {
                             sums.normal[k][pattern.place(e, i, j)] += part.normal[k][i][j];
                         }
                     }

@@ -23,7 +23,9 @@ pub fn start(
     fn tensor([x, y, z]: [f64; 3]) -> [f64; 6] {
         [x * x, y * y, z * z, x * y, y * z, x * z]
     }
-    let parts: Vec<([[f64; 8]; 8], [[f64; 8]; 6])> = (0..samples.elements())
+    /// The matrix of an element, and its right sides.
+    type Part = ([[f64; 8]; 8], [[f64; 8]; 6]);
+    let parts: Vec<Part> = (0..samples.elements())
         .into_par_iter()
         .map(|e| {
             let (mut normal, mut right) = ([[0.0; 8]; 8], [[0.0; 8]; 6]);

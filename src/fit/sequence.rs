@@ -311,6 +311,7 @@ pub fn settings(scene: &Scene) -> Settings {
         max_iterations: s.max_iterations,
         step_max: s.step_max,
         step_min: s.step_min,
+        precision: s.precision,
         ..Settings::default()
     }
 }

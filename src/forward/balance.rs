@@ -2,7 +2,7 @@
 
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
-use crate::math::factor::{self, Factor};
+use crate::math::factor::{self, Factor, Precision};
 use crate::math::sparse::SymmetricMatrix;
 use crate::math::tensor::{norm, subtract};
 use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
@@ -28,6 +28,7 @@ const STALE_SWEEPS: usize = 12;
 pub(super) struct Balance<'m> {
     pub model: &'m Model,
     pub tolerance: f64,
+    precision: Precision,
     workspace: Workspace,
     tangent: Tangent,
     factor: Factor,
@@ -77,14 +78,15 @@ pub(super) struct Direction {
 }
 
 impl<'m> Balance<'m> {
-    pub fn new(model: &'m Model, tolerance: f64) -> Result<Balance<'m>> {
+    pub fn new(model: &'m Model, tolerance: f64, precision: Precision) -> Result<Balance<'m>> {
         let terms = model.terms().len();
         Ok(Balance {
             model,
             tolerance,
+            precision,
             workspace: Workspace::default(),
             tangent: model.tangent(),
-            factor: Factor::new(model.symbolic().clone())?,
+            factor: Factor::new(model.symbolic().clone(), precision)?,
             factored: false,
             earlier: factor::Work::default(),
             target: Drive { controls: vec![0.0; model.controls().len()], load: 0.0 },
@@ -338,10 +340,8 @@ impl<'m> Balance<'m> {
     fn refactor(&mut self) -> Result<()> {
         self.factored = false;
         if !Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern()) {
-            let mut work = self.factor.work();
-            work += self.earlier;
-            self.earlier = work;
-            self.factor = Factor::new(self.model.symbolic_of(&self.tangent)?)?;
+            self.earlier += self.factor.work();
+            self.factor = Factor::new(self.model.symbolic_of(&self.tangent)?, self.precision)?;
         }
         self.factor.refactor(&self.tangent.matrix)?;
         self.factored = true;

@@ -7,6 +7,7 @@ mod release;
 mod work;
 
 use crate::error::{Error, Likely, Result};
+use crate::math::factor::Precision;
 use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
 use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, Test, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
@@ -60,11 +61,20 @@ pub struct Settings {
     /// Whether a body that loses its balance on the path is let go ([`Snap`]). The answer then jumps with the controls, which
     /// a fit cannot use.
     pub release: bool,
+    /// In which the tangent is factorised; taken when the solver is made.
+    pub precision: Precision,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4, release: true }
+        Settings {
+            tolerance: 1e-8,
+            max_iterations: 30,
+            step_max: 1.0,
+            step_min: 1e-4,
+            release: true,
+            precision: Precision::Double,
+        }
     }
 }
 
@@ -152,7 +162,7 @@ impl<'m> Solver<'m> {
     /// # Errors
     /// Where the factor does not fit into memory.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Solver<'m>> {
-        Ok(Solver { balance: Balance::new(model, settings.tolerance)?, settings })
+        Ok(Solver { balance: Balance::new(model, settings.tolerance, settings.precision)?, settings })
     }
 
     /// The model.

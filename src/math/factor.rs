@@ -24,10 +24,14 @@ use super::sparse::{BlockPattern, SymmetricMatrix};
 use crate::{Error, Result};
 use equilibrate::equilibrate;
 use front::{Contribution, Panel, Pool, Source};
+use scalar::Scalar;
 use tree::{Front, Tree};
+
+pub use scalar::Precision;
 
 mod equilibrate;
 mod front;
+mod scalar;
 mod solve;
 mod tree;
 
@@ -35,8 +39,8 @@ mod tree;
 const BATCH: usize = 16;
 /// Numbers checked together by one thread.
 const CHECKED: usize = 1 << 16;
-/// A pivot of the equilibrated matrix below this is rounding, not a number.
-const ZERO_PIVOT: f64 = 64.0 * f64::EPSILON;
+/// A pivot of the equilibrated matrix below so many units of rounding is rounding, not a number.
+const ZERO_PIVOT: f64 = 64.0;
 
 /// The structure of the factor; computed once per pattern, shared by threads.
 #[derive(Debug)]
@@ -89,7 +93,7 @@ pub struct Inertia {
     pub positive: usize,
     /// Negative eigenvalues.
     pub negative: usize,
-    /// Eigenvalues that cannot be told from zero in double precision after equilibration.
+    /// Eigenvalues that cannot be told from zero in the precision of the factor after equilibration.
     pub zero: usize,
 }
 
@@ -135,12 +139,22 @@ pub struct Factor {
     symbolic: Arc<Symbolic>,
     /// s_i, powers of two: scaling rounds nothing.
     scale: Vec<f64>,
-    /// One for each front.
-    panels: Vec<Panel>,
-    pool: Pool,
+    numbers: Numbers,
     inertia: Inertia,
     is_valid: bool,
     work: Work,
+}
+
+/// L and B in one precision or the other.
+enum Numbers {
+    Double(Fronts<f64>),
+    Single(Fronts<f32>),
+}
+
+/// L and B of every front, and memory that they share.
+struct Fronts<T> {
+    panels: Vec<Panel<T>>,
+    pool: Pool<T>,
 }
 
 impl Factor {
@@ -148,13 +162,15 @@ impl Factor {
     ///
     /// # Errors
     /// [`Error::FactorTooLarge`] if there is not enough.
-    pub fn new(symbolic: Arc<Symbolic>) -> Result<Self> {
+    pub fn new(symbolic: Arc<Symbolic>, precision: Precision) -> Result<Self> {
         let n = symbolic.pattern.n();
-        let panels = symbolic.tree.fronts.iter().map(Panel::new).collect::<Option<_>>();
+        let numbers = match precision {
+            Precision::Double => Fronts::new(&symbolic.tree).map(Numbers::Double),
+            Precision::Single => Fronts::new(&symbolic.tree).map(Numbers::Single),
+        };
         Ok(Self {
             scale: vec![1.0; n],
-            panels: panels.ok_or_else(|| symbolic.too_large())?,
-            pool: Pool::default(),
+            numbers: numbers.ok_or_else(|| symbolic.too_large())?,
             inertia: Inertia::default(),
             is_valid: n == 0,
             work: Work::default(),
@@ -180,21 +196,12 @@ impl Factor {
             return Err(Error::NotFinite);
         }
         equilibrate(a, &mut self.scale);
-        let tree = &self.symbolic.tree;
-        let source = Source { matrix: a, scale: &self.scale, pool: &self.pool };
-        let mut rest = self.panels.as_mut_slice();
-        let mut trees = Vec::new();
-        for &root in &tree.roots {
-            let (panels, others) = rest.split_at_mut(root + 1 - tree.fronts[root].first);
-            trees.push((root, panels));
-            rest = others;
-        }
-        let done: Option<Vec<_>> =
-            trees.into_par_iter().map(|(root, panels)| factor_subtree(&source, tree, root, panels)).collect();
-        for contribution in done.ok_or_else(|| self.symbolic.too_large())? {
-            source.release(contribution);
-        }
-        self.inertia = self.count_signs()?;
+        let (tree, scale) = (&self.symbolic.tree, self.scale.as_slice());
+        let inertia = match &mut self.numbers {
+            Numbers::Double(fronts) => fronts.factor(tree, a, scale),
+            Numbers::Single(fronts) => fronts.factor(tree, a, scale),
+        };
+        self.inertia = inertia.ok_or_else(|| self.symbolic.too_large())??;
         self.is_valid = true;
         self.work.factorisations += 1;
         self.work.factor_flops += self.symbolic.flops;
@@ -235,18 +242,11 @@ impl Factor {
 
     /// x <- S P^T (L B L^T)^-1 P S x for each column.
     fn precondition(&self, x: &mut [f64]) {
-        let n = self.scale.len();
-        let order = &self.symbolic.tree.permutation;
-        x.par_chunks_mut(n * BATCH).for_each(|x| {
-            let mut permuted = vec![0.0; x.len()];
-            for (x, permuted) in x.chunks(n).zip(permuted.chunks_mut(n)) {
-                permuted.iter_mut().zip(order).for_each(|(y, &i)| *y = self.scale[i] * x[i]);
-            }
-            solve::solve(&self.symbolic.tree, &self.panels, &mut permuted, x.len() / n);
-            for (x, permuted) in x.chunks_mut(n).zip(permuted.chunks(n)) {
-                permuted.iter().zip(order).for_each(|(y, &i)| x[i] = self.scale[i] * y);
-            }
-        });
+        let tree = &self.symbolic.tree;
+        match &self.numbers {
+            Numbers::Double(fronts) => fronts.precondition(tree, &self.scale, x),
+            Numbers::Single(fronts) => fronts.precondition(tree, &self.scale, x),
+        }
     }
 
     /// Signs of the eigenvalues of the matrix last factored.
@@ -268,21 +268,66 @@ impl Factor {
     pub fn work(&self) -> Work {
         self.work
     }
+}
+
+impl<T: Scalar> Fronts<T> {
+    /// Reserves the memory of the panels; `None` if there is not enough.
+    fn new(tree: &Tree) -> Option<Self> {
+        let panels = tree.fronts.iter().map(Panel::new).collect::<Option<_>>()?;
+        Some(Fronts { panels, pool: Pool::default() })
+    }
+
+    /// S A S in fronts; `None` if there is no memory for them.
+    fn factor(&mut self, tree: &Tree, matrix: &SymmetricMatrix, scale: &[f64]) -> Option<Result<Inertia>> {
+        let source = Source { matrix, scale, pool: &self.pool };
+        let mut rest = self.panels.as_mut_slice();
+        let mut trees = Vec::new();
+        for &root in &tree.roots {
+            let (panels, others) = rest.split_at_mut(root + 1 - tree.fronts[root].first);
+            trees.push((root, panels));
+            rest = others;
+        }
+        let done: Option<Vec<_>> =
+            trees.into_par_iter().map(|(root, panels)| factor_subtree(&source, tree, root, panels)).collect();
+        for contribution in done? {
+            source.release(contribution);
+        }
+        Some(self.count_signs(tree))
+    }
+
+    /// x <- S P^T (L B L^T)^-1 P S x for each column.
+    fn precondition(&self, tree: &Tree, scale: &[f64], x: &mut [f64]) {
+        let n = scale.len();
+        let order = &tree.permutation;
+        x.par_chunks_mut(n * BATCH).for_each(|x| {
+            let mut permuted = vec![T::default(); x.len()];
+            for (x, permuted) in x.chunks(n).zip(permuted.chunks_mut(n)) {
+                permuted.iter_mut().zip(order).for_each(|(y, &i)| *y = T::round(scale[i] * x[i]));
+            }
+            solve::solve(tree, &self.panels, &mut permuted, x.len() / n);
+            for (x, permuted) in x.chunks_mut(n).zip(permuted.chunks(n)) {
+                permuted.iter().zip(order).for_each(|(y, &i)| x[i] = scale[i] * y.widen());
+            }
+        });
+    }
 
     /// Signs of the blocks of B.
-    fn count_signs(&self) -> Result<Inertia> {
+    fn count_signs(&self, tree: &Tree) -> Result<Inertia> {
         let mut inertia = Inertia::default();
-        let tree = &self.symbolic.tree;
+        let zero = ZERO_PIVOT * T::epsilon_impl().widen();
         for (front, panel) in tree.fronts.iter().zip(&self.panels) {
             let (block, _) = panel.blocks(front);
             let mut j = 0;
             while j < front.width() {
-                let (d, below) = (block[(j, j)], panel.subdiagonal[j]);
+                let (d, below) = (block[(j, j)].widen(), panel.subdiagonal[j].widen());
                 // eigenvalues of a block of order 2 from its mean and its radius
                 let order = if below == 0.0 { 1 } else { 2 };
                 let (mean, radius) = match order {
                     1 => (d, 0.0),
-                    _ => (0.5 * (d + block[(j + 1, j + 1)]), (0.5 * (d - block[(j + 1, j + 1)])).hypot(below)),
+                    _ => {
+                        let next = block[(j + 1, j + 1)].widen();
+                        (0.5 * (d + next), (0.5 * (d - next)).hypot(below))
+                    }
                 };
                 for eigenvalue in [mean + radius, mean - radius].into_iter().take(order) {
                     if !eigenvalue.is_finite() || eigenvalue == 0.0 {
@@ -292,7 +337,7 @@ impl Factor {
                         return Err(Error::Singular { unknown });
                     }
                     match eigenvalue {
-                        value if value.abs() <= ZERO_PIVOT => inertia.zero += 1,
+                        value if value.abs() <= zero => inertia.zero += 1,
                         value if value > 0.0 => inertia.positive += 1,
                         _ => inertia.negative += 1,
                     }
@@ -308,7 +353,12 @@ impl Factor {
 ///
 /// Below `root`, the first front with two or more heavy children lets the threads of the pool share these; all fronts
 /// that remain come after them and are factored one after the other. `panels` are those of the subtree.
-fn factor_subtree(source: &Source<'_>, tree: &Tree, root: usize, panels: &mut [Panel]) -> Option<Contribution> {
+fn factor_subtree<T: Scalar>(
+    source: &Source<'_, T>,
+    tree: &Tree,
+    root: usize,
+    panels: &mut [Panel<T>],
+) -> Option<Contribution<T>> {
     let mut branch = root;
     while tree.fronts[branch].heavy_children == 1 {
         branch = tree.fronts[branch].children[0];

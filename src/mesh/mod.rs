@@ -7,6 +7,7 @@ pub mod cycled;
 pub mod element;
 pub mod exf;
 pub mod face;
+pub mod facial;
 pub mod fibre_angles;
 pub mod halved;
 pub mod join;

@@ -11,14 +11,15 @@ use crate::mesh::block::block;
 use crate::mesh::element::{Element, TricubicHermite, Trilinear};
 use crate::mesh::exf::{ExFile, Geometry};
 use crate::mesh::face::{Face, boundary_faces};
+use crate::mesh::facial;
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::join::join;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
-    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceName, FaceSpec,
-    FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec, PressureSpec, Scene,
-    SupportKind, SurfaceSpec,
+    ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceMeshSpec, FaceMuscleSpec,
+    FaceName, FaceSpec, FibresSpec, GeometrySpec, InitialSpec, LoadKind, MeshSpec, MuscleSpec, NamedBlockSpec,
+    PressureSpec, Scene, SupportKind, SurfaceSpec,
 };
 use crate::term::Term;
 use crate::term::bone::Bone;
@@ -190,6 +191,11 @@ fn host_with_warning(spec: &MeshSpec) -> Result<(Mesh, Option<Warning>)> {
             }
             Err(Error::HostNotHermite { field: field.into(), place: Box::new(spec.place.clone()) })
         }
+        GeometrySpec::Face(FaceMeshSpec { layers, halved, half, face, landmarks: _ }) => {
+            let options = facial::Options { layers: *layers, halved: *halved, half: *half };
+            Ok((facial::host(&face.sheet, options), None))
+        }
+        GeometrySpec::FaceMuscle(_) => unreachable!("no host is read as a muscle"),
     }
 }
 
@@ -221,6 +227,10 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
                     "boundary is all of it, 7:xi1=0 a single face of element 7, xi1=0 all faces on that side of their \
                      element; faces between two elements are not on the boundary"
                 }
+                GeometrySpec::Face(_) | GeometrySpec::FaceMuscle(_) => {
+                    "a face has skin, deep, rim, lip.upper, lip.lower, lid.upper.L, lid.lower.L, deep.perioral, deep.sliding, \
+                     deep.eye.L, the same with .R unless it is half a face, then midline; and xi1=0 to xi3=1"
+                }
             };
             let face = name.to_string().into();
             return Err(Error::NoSuchFace { face, named, place: Box::new(place.clone()) });
@@ -233,8 +243,17 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
 }
 
 /// The mesh of a muscle, the angles of its fibres, and the warning of its mesh.
-fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
+///
+/// # Errors
+/// An EX file that cannot be read, or that has no such angles.
+pub fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
     let (mesh, file) = match &spec.geometry {
+        GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face }) => {
+            let course = face.muscle(name).unwrap_or_else(|| unreachable!("checked by the scene"));
+            let (mesh, angles) = course.mesh(&face.sheet, *side);
+            return Ok((mesh, angles, None));
+        }
+        GeometrySpec::Face(_) => unreachable!("no muscle is read as a face"),
         GeometrySpec::Block(spec) => (block(&Trilinear, spec.origin_mm, spec.size_mm, spec.elements), None),
         GeometrySpec::Blocks(all) => (blocks(&Trilinear, all), None),
         GeometrySpec::Exf(exf) => {
@@ -244,6 +263,7 @@ fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)
         }
     };
     let angles = match &spec.fibres {
+        FibresSpec::Face => unreachable!("only of a muscle of the face"),
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
             FibreAngles::at_nodes(nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect())
@@ -347,7 +367,11 @@ fn contact(
             (Between::Two(own, others), *depth_mm)
         }
         SurfaceSpec::Itself { depth_mm } => (Between::Itself(own), *depth_mm),
-        _ => return rigid_contact(spec, allows, mesh, &own, bone),
+        SurfaceSpec::Reference(Some(face)) => {
+            let before = faces(scene, mesh, face, &spec.place)?;
+            return rigid_contact(spec, allows, mesh, [&own, &before], bone);
+        }
+        _ => return rigid_contact(spec, allows, mesh, [&own, &own], bone),
     };
     let manner = Manner { law: contact_law(&spec.law), relax: spec.initial == InitialSpec::Relax, depth };
     let contact = Mutual::new(&spec.name, manner, mesh, between, spec.gauss);
@@ -367,11 +391,12 @@ fn contact_law(law: &ContactLawSpec) -> Box<dyn ContactLaw> {
     }
 }
 
+/// Contact of the first faces with a rigid surface, which may be where the second ones are at rest.
 fn rigid_contact(
     spec: &ContactSpec,
     allows: Allows,
     mesh: &Mesh,
-    faces: &[Face],
+    [faces, before]: [&[Face]; 2],
     bone: Option<Arc<Bone>>,
 ) -> Result<(Box<dyn Term>, Option<Warning>)> {
     let free = |inside: bool| if inside { FreeSide::Inside } else { FreeSide::Outside };
@@ -388,8 +413,8 @@ fn rigid_contact(
         SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
             Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
         }
-        SurfaceSpec::Reference | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
-            Box::new(Patches::new(mesh, faces, FreeSide::Inside))
+        SurfaceSpec::Reference(_) | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
+            Box::new(Patches::new(mesh, before, FreeSide::Inside))
         }
     };
     let relax = spec.initial == InitialSpec::Relax;

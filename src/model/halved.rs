@@ -87,11 +87,14 @@ fn halved(scene: &Scene, mesh: &Mesh) -> Result<(Scene, Halving), Box<Warning>> 
     let blocks = match &mut scene.mesh.geometry {
         GeometrySpec::Block(spec) => vec![halve(spec)],
         GeometrySpec::Blocks(all) => all.iter_mut().map(|named| halve(&mut named.block)).collect(),
-        GeometrySpec::Exf(_) => {
-            let help = "compare with a finer mesh of the same body instead";
+        other => {
+            let (what, help) = match other {
+                GeometrySpec::Face(_) => ("a face", "compare with face = { halved = true } instead"),
+                _ => ("an EX file", "compare with a finer mesh of the same body instead"),
+            };
             return Err(Box::new(Warning {
                 place: Some(scene.mesh.place.clone()),
-                ..*refusal("elements of an EX file cannot be halved yet".into(), Some(help.into()))
+                ..*refusal(format!("elements of {what} cannot be halved yet"), Some(help.into()))
             }));
         }
     };
@@ -100,7 +103,8 @@ fn halved(scene: &Scene, mesh: &Mesh) -> Result<(Scene, Halving), Box<Warning>> 
         let own = super::tissue::elements(&region.part, mesh);
         region.part = PartSpec::Elements(own.into_iter().flat_map(|element| halving.parts(element)).collect());
     }
-    for muscle in &mut scene.muscles {
+    // a rule that is cut at the elements of the host follows them
+    for muscle in scene.muscles.iter_mut().filter(|muscle| !muscle.cut) {
         muscle.gauss *= 2;
     }
     Ok((scene, halving))

@@ -1,9 +1,10 @@
 //! `[[bone]]`: rigid bodies that move, and what is tied to them.
 
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, Reader, Table};
+use super::face;
 use super::interpret::direction;
 use super::references::help_for_name;
-use super::spec::{AttachmentSpec, BoneSpec, HingeSpec, SlideSpec, TieSpec};
+use super::spec::{AttachmentSpec, BoneSpec, HingeSpec, MeshSpec, SlideSpec, TieSpec};
 use super::tree::{Entry, Node, Value};
 use crate::error::{Error, Place};
 
@@ -47,8 +48,16 @@ fn bounds(item: Item) -> Option<[f64; 2]> {
     }
 }
 
-pub(super) fn attachment(table: &mut Table) -> Option<AttachmentSpec> {
-    let position_mm = table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE));
+pub(super) fn attachment(table: &mut Table, host: Option<&MeshSpec>) -> Option<AttachmentSpec> {
+    let ligament = table.item("ligament").map(|item| face::ligament(&item, host));
+    let position_mm = match ligament {
+        Some(_) if table.has("position_mm") => {
+            drop(table.item("position_mm"));
+            table.not_exactly_one(&["position_mm", "ligament"], &["position_mm", "ligament"])
+        }
+        Some(position_mm) => position_mm,
+        None => table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE)),
+    };
     let spring: Reader<TieSpec> = |item| {
         let stiffness_mn_per_mm = item.number(NOT_NEGATIVE)?;
         Some(TieSpec::Spring { stiffness_mn_per_mm })

@@ -3,6 +3,7 @@
 use super::cursor::{FINITE, Item, POSITIVE, Reader, Table};
 use super::interpret::{direction, face, faces};
 use super::spec::*;
+use super::tree::Value;
 
 type Contacts = Option<Vec<ContactSpec>>;
 
@@ -66,9 +67,10 @@ fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[La
 }
 
 fn surface(table: &mut Table) -> Option<SurfaceSpec> {
-    let reference: Reader<SurfaceSpec> = |item| match item.flag()? {
-        true => Some(SurfaceSpec::Reference),
-        false => item.out_of_range("false", "true, or another surface"),
+    let reference: Reader<SurfaceSpec> = |item| match item.node.value {
+        Value::Flag(true) => Some(SurfaceSpec::Reference(None)),
+        Value::Flag(false) => item.out_of_range("false", "true, faces, or another surface"),
+        _ => faces(item).map(|face| SurfaceSpec::Reference(Some(face))),
     };
     table.one_of(&[
         ("plane", |item| item.table(plane)),

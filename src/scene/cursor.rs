@@ -202,6 +202,11 @@ pub(super) struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
+    /// Where mistakes are noted.
+    pub fn mistakes(&self) -> &'a Mistakes {
+        self.mistakes
+    }
+
     /// The header of the table.
     pub fn place(&self) -> Place {
         self.node.place.clone()

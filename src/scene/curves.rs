@@ -1,4 +1,7 @@
 //! Controls over time, read from a table: `time_s,<control>,...`, one row per instant.
+//!
+//! The table `activations.csv` of a run is such a table too: its column `frame` and the deviations `<control>_sd` are
+//! passed over.
 
 use super::cursor::Mistakes;
 use super::references::{first_use, help_for_name};
@@ -45,7 +48,14 @@ impl Curves {
             .enumerate()
             .map(|(index, text)| Line { file: &file, number: index + 1, text })
             .filter(|line| !line.text.trim().is_empty());
-        let header = lines.next().map(|line| line.cells()).unwrap_or_default();
+        let all = lines.next().map(|line| line.cells()).unwrap_or_default();
+        let width = all.len();
+        let is_known = |name: &str| controls.iter().any(|control| control.name == name);
+        let is_passed_over = |index: usize, name: &str| {
+            index == 0 && name == "frame" || !is_known(name) && name.strip_suffix("_sd").is_some_and(is_known)
+        };
+        let passed_over: Vec<bool> = all.iter().enumerate().map(|(i, cell)| is_passed_over(i, cell.text)).collect();
+        let header = kept(all, &passed_over);
         if header.first().is_none_or(|cell| cell.text != "time_s") {
             mistakes.add(Error::MissingKey {
                 table: "the header of the table".into(),
@@ -76,16 +86,17 @@ impl Curves {
         };
         for line in lines {
             let cells = line.cells();
-            if cells.len() != header.len() {
+            if cells.len() != width {
                 mistakes.add(Error::WrongLength {
                     key: format!("line {}", line.number),
                     found: format!("{} cells", cells.len()).into(),
-                    expected: format!("{}, as the header has", header.len()),
+                    expected: format!("{width}, as the header has"),
                     place: line.place(0..line.text.len()),
                 });
                 continue;
             }
-            let (time, values) = (&cells[0], &cells[1..]);
+            let cells = kept(cells, &passed_over);
+            let Some((time, values)) = cells.split_first() else { continue };
             if let Some(time_s) = time.number("time_s", &mistakes) {
                 match curves.times_s.last() {
                     Some(&previous_s) if time_s <= previous_s => {
@@ -134,6 +145,11 @@ pub(super) fn what(controls: &[ControlRange]) -> (&'static str, &'static str) {
         true => ("muscle", "muscles"),
         false => ("control", "controls"),
     }
+}
+
+/// The cells of the columns that are not passed over.
+fn kept<'a>(cells: Vec<Cell<'a>>, passed_over: &[bool]) -> Vec<Cell<'a>> {
+    cells.into_iter().zip(passed_over).filter(|(_, passed_over)| !**passed_over).map(|(cell, _)| cell).collect()
 }
 
 /// A line of the table.

@@ -71,7 +71,7 @@ impl Scene {
             | SurfaceSpec::Sphere { .. }
             | SurfaceSpec::Cylinder { .. }
             | SurfaceSpec::Capsule { .. }
-            | SurfaceSpec::Reference => "contact with a rigid surface",
+            | SurfaceSpec::Reference(_) => "contact with a rigid surface",
             SurfaceSpec::Faces { .. } => "contact with other faces",
             SurfaceSpec::Itself { .. } => "contact with itself",
         });

@@ -166,19 +166,19 @@ pub(super) fn fibres(
         });
         let example = "[fibres]\n[[fibres.data]]\nfile = \"axes.csv\"\nunits = \"mm\"";
         let settings = file.required("fibres", example, |item| item.table(|table| settings(table, references)));
-        let muscles = file.tables("muscle", |table| muscle(table, references));
         // as it stands in the file, even where the rest of its table is mistaken
         let wanted = muscle_of(root);
         let mesh_example = "[mesh]\nblock = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
+        let read = |item: Item| item.table(|table| mesh(table, references));
+        let host = match &wanted {
+            // only a muscle of the face needs its host to be fitted
+            Some(_) => file.optional("mesh", read).flatten(),
+            None => file.required("mesh", mesh_example, read),
+        };
+        let muscles = file.tables("muscle", |table| muscle(table, references, host.as_ref()));
         let body = match wanted {
-            // a muscle needs no host to be fitted
-            Some((muscle, place)) => {
-                file.optional("mesh", |item| item.table(|table| mesh(table, references)));
-                named(muscles?, muscle, place, mistakes)
-            }
-            None => file
-                .required("mesh", mesh_example, |item| item.table(|table| mesh(table, references)))
-                .map(FibreBody::Mesh),
+            Some((name, place)) => named(muscles?, name, place, mistakes),
+            None => host.map(FibreBody::Mesh),
         };
         let Settings { angles, data, outside, smoothness, loss, folds, fixed, place } = settings?;
         let (name, body) = (name?, body?);
@@ -191,7 +191,7 @@ fn named(muscles: Vec<MuscleSpec>, name: String, place: Place, mistakes: &Mistak
     let found = muscles.into_iter().find(|muscle| muscle.name == name);
     if found.is_none() {
         let help = super::references::help_for_name(&name, &known, "muscles");
-        mistakes.add(Error::UnknownName { kind: "muscle", name: name.into(), help, place });
+        mistakes.add(Error::UnknownName { kind: "muscle", name, help, place });
     }
     found.map(|muscle| FibreBody::Muscle(Box::new(muscle)))
 }

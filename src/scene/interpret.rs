@@ -4,10 +4,15 @@ use super::Scene;
 use super::bones;
 use super::contacts;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
+use super::face;
+use super::nearest::nearest;
 use super::references::References;
 use super::spec::*;
 use super::tree::{Node, Value};
 use super::units::Units;
+use crate::error::Error;
+use crate::math::factor::Precision;
+use crate::mesh::facial::FACES;
 
 /// The scene of a whole file; `None` if there is any mistake in a value.
 pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: &Mistakes) -> Option<Scene> {
@@ -25,12 +30,12 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         });
         let word = tissue.as_ref().map(|tissue| tissue.law.word());
         let regions = file.tables("region", |table| region(table, word));
-        let muscles = file.tables("muscle", |table| muscle(table, references));
+        let muscles = file.tables("muscle", |table| muscle(table, references, mesh.as_ref()));
         let bones = file.tables("bone", bones::bone);
         let supports = file.tables("support", support);
         let (slidings, contacts) = contacts::both(file);
         let loads = file.tables("load", load);
-        let attachments = file.tables("attachment", bones::attachment);
+        let attachments = file.tables("attachment", |table| bones::attachment(table, mesh.as_ref()));
         let controls =
             file.or("controls", Vec::new(), |item| references.controls(&item, muscles.as_deref(), bones.as_deref()));
         let probes = file.tables("probe", probe);
@@ -78,7 +83,13 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
 
 impl Default for SolverSpec {
     fn default() -> Self {
-        SolverSpec { tolerance: 1e-8, max_iterations: 30, step_max: 1.0, step_min: 1e-4 }
+        SolverSpec {
+            tolerance: 1e-8,
+            max_iterations: 30,
+            step_max: 1.0,
+            step_min: 1e-4,
+            precision: Precision::Double,
+        }
     }
 }
 
@@ -120,17 +131,18 @@ fn block(table: &mut Table) -> Option<BlockSpec> {
 
 pub(super) fn mesh(table: &mut Table, references: &References) -> Option<MeshSpec> {
     let example = "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
+    const KEYS: [&str; 4] = ["block", "blocks", "exf", "face"];
+    let found: Vec<&str> = KEYS.into_iter().filter(|key| table.has(key)).collect();
+    if found.len() > 1 {
+        KEYS.iter().for_each(|key| drop(table.item(key)));
+        return table.not_exactly_one(&KEYS, &found);
+    }
     let blocks = table.item("blocks").map(|item| blocks(&item));
-    let geometry = match blocks {
-        None => geometry(table, references, example),
-        Some(blocks) if table.has("block") || table.has("exf") => {
-            let keys = ["block", "blocks", "exf"];
-            keys.iter().for_each(|key| drop(table.item(key)));
-            let found: Vec<&str> = keys.into_iter().filter(|key| table.has(key)).collect();
-            drop(blocks);
-            table.not_exactly_one(&keys, &found)
-        }
-        Some(blocks) => blocks.map(GeometrySpec::Blocks),
+    let face = table.item("face").map(|item| face::face_mesh(&item, references));
+    let geometry = match (blocks, face) {
+        (Some(blocks), _) => blocks.map(GeometrySpec::Blocks),
+        (None, Some(face)) => face.map(GeometrySpec::Face),
+        (None, None) => geometry(table, references, example),
     };
     Some(MeshSpec { geometry: geometry?, place: table.place() })
 }
@@ -249,20 +261,34 @@ fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
     Some(LawSpec::MooneyRivlin { c1_kpa, c2_kpa })
 }
 
-pub(super) fn muscle(table: &mut Table, references: &References) -> Option<MuscleSpec> {
+pub(super) fn muscle(table: &mut Table, references: &References, host: Option<&MeshSpec>) -> Option<MuscleSpec> {
     let name = table.required("name", "name = \"slab\"", |item| item.name());
     let example = "block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }";
+    const KEYS: [&str; 3] = ["block", "exf", "face"];
+    let found: Vec<&str> = KEYS.into_iter().filter(|key| table.has(key)).collect();
+    let in_face = found == ["face"];
     let in_file = table.has("exf");
-    let geometry = geometry(table, references, example);
+    let geometry = match &found[..] {
+        ["face"] => face::muscle(table, host).map(GeometrySpec::FaceMuscle),
+        [_, _, ..] if table.has("face") => {
+            KEYS.iter().for_each(|key| drop(table.item(key)));
+            table.not_exactly_one(&KEYS, &found)
+        }
+        _ => geometry(table, references, example),
+    };
     let later = [("hermite", "tricubic Hermite muscles")];
-    let element = match in_file {
-        // the file says what its elements are
+    let element = match in_file || in_face {
+        // the file or the face says what its elements are
         true => Some(ElementSpec::Trilinear),
         false => table.or("element", ElementSpec::Trilinear, |item| {
             item.choice(&[("trilinear", ElementSpec::Trilinear)], &later)
         }),
     };
-    let fibres = if in_file { fibres_in_file(table) } else { fibres(table, geometry.as_ref()) };
+    let fibres = match (in_face, in_file) {
+        (true, _) => Some(FibresSpec::Face),
+        (false, true) => fibres_in_file(table),
+        (false, false) => fibres(table, geometry.as_ref()),
+    };
     let activations = [("uniform", ActivationSpec::Uniform), ("field", ActivationSpec::Field)];
     let activation = table.or("activation", ActivationSpec::Uniform, |item| item.choice(&activations, &[]));
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
@@ -400,6 +426,16 @@ fn face_name(item: &Item) -> Option<FaceName> {
             Ok(element) => FaceName::OfElement { element, direction, end },
             Err(_) => FaceName::OfBlock { block: part.trim().to_owned(), direction, end },
         });
+    }
+    let text = item.text()?;
+    if FACES.contains(&text) {
+        return Some(FaceName::OfFace(text.to_owned()));
+    }
+    if let Some(near) = nearest(text, FACES.into_iter()) {
+        let (key, value, place) = (item.path.clone(), text.into(), item.node.place.clone());
+        let help = format!("did you mean \"{near}\"? a face has {}", FACES.join(", "));
+        item.mistakes.add(Error::UnknownChoice { key, value, help, place });
+        return None;
     }
     let words: Vec<(&str, usize)> = names.iter().enumerate().map(|(k, (word, _))| (word.as_str(), k)).collect();
     item.choice(&words, &[]).map(|k| names[k].1.clone())
@@ -540,11 +576,14 @@ fn solver(table: &mut Table) -> Option<SolverSpec> {
     let max_iterations = table.or("max_iterations", default.max_iterations, |item| item.whole(1, 10_000));
     let step_max = table.or("step_max", default.step_max, |item| item.number(PART));
     let step_min = table.or("step_min", default.step_min, |item| item.number(PART));
+    let precisions = [Precision::Double, Precision::Single].map(|precision| (precision.word(), precision));
+    let precision = table.or("precision", default.precision, |item| item.choice(&precisions, &[]));
     let (step_max, step_min) = (step_max?, step_min?);
     if step_min > step_max {
         return table.contradiction("step_min", "step_max", step_min, &format!("at most step_max = {step_max:?}"));
     }
-    Some(SolverSpec { tolerance: tolerance?, max_iterations: max_iterations?, step_max, step_min })
+    let (tolerance, max_iterations, precision) = (tolerance?, max_iterations?, precision?);
+    Some(SolverSpec { tolerance, max_iterations, step_max, step_min, precision })
 }
 
 fn output(table: &mut Table) -> Option<OutputSpec> {

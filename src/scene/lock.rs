@@ -100,7 +100,7 @@ impl Scene {
             lines.push(format!("position_mm = {}", numbers(position_mm)));
             lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
         }
-        let SolverSpec { tolerance, max_iterations, step_max, step_min } = *solver;
+        let SolverSpec { tolerance, max_iterations, step_max, step_min, precision } = *solver;
         let OutputSpec { view, every, estimate } = output;
         lines.extend([
             "\n[solver]".into(),
@@ -108,6 +108,7 @@ impl Scene {
             format!("max_iterations = {max_iterations}"),
             format!("step_max = {}", number(step_max)),
             format!("step_min = {}", number(step_min)),
+            format!("precision = {}", text(precision.word())),
             "\n[output]".into(),
             format!("view = {view}"),
             format!("every = {every}"),
@@ -137,6 +138,14 @@ fn geometry(geometry: &GeometrySpec) -> String {
         GeometrySpec::Exf(ExfSpec { path: file, field }) => {
             let field = field.as_ref().map(|field| format!("\nfield = {}", text(field))).unwrap_or_default();
             format!("exf = {}{field}", path(file))
+        }
+        GeometrySpec::Face(FaceMeshSpec { landmarks, layers, halved, half, face: _ }) => {
+            let landmarks =
+                landmarks.as_ref().map(|file| format!("landmarks = {}, ", path(file))).unwrap_or_default();
+            format!("face = {{ {landmarks}layers = {layers}, halved = {halved}, half = {half} }}")
+        }
+        GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face: _ }) => {
+            format!("face = {}\nside = \"{}\"", text(name), side.letter())
         }
     }
 }
@@ -205,20 +214,17 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
     if let GeometrySpec::Block(_) = shape {
         lines.push("element = \"trilinear\"".into());
     }
-    lines.extend([
-        match fibres {
-            FibresSpec::Field(field) => format!("angles_field = {}", text(field)),
-            FibresSpec::Uniform(angles) => format!("fibre_angles_deg = {}", numbers(angles)),
-            FibresSpec::Nodes(nodes) => {
-                nodes.iter().fold("fibre_angles_nodes_deg = [\n".to_string(), |list, angles| {
-                    list + "  " + &numbers(angles) + ",\n"
-                }) + "]"
-            }
-        },
-        format!("activation = \"{activation}\""),
-        format!("gauss = {gauss}"),
-        format!("cut = {cut}"),
-    ]);
+    lines.extend(match fibres {
+        FibresSpec::Face => None,
+        FibresSpec::Field(field) => Some(format!("angles_field = {}", text(field))),
+        FibresSpec::Uniform(angles) => Some(format!("fibre_angles_deg = {}", numbers(angles))),
+        FibresSpec::Nodes(nodes) => Some(
+            nodes.iter().fold("fibre_angles_nodes_deg = [\n".to_string(), |list, angles| {
+                list + "  " + &numbers(angles) + ",\n"
+            }) + "]",
+        ),
+    });
+    lines.extend([format!("activation = \"{activation}\""), format!("gauss = {gauss}"), format!("cut = {cut}")]);
     lines.extend(taper_mm.map(|taper| format!("taper_mm = {}", number(taper))));
     lines.extend([format!(
         "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
@@ -306,7 +312,8 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             numbers(to_mm),
             round(radius_mm, inside)
         ),
-        SurfaceSpec::Reference => "reference = true".into(),
+        SurfaceSpec::Reference(None) => "reference = true".into(),
+        SurfaceSpec::Reference(Some(face)) => format!("reference = {}", faces(face)),
         SurfaceSpec::Faces { face, depth_mm } => {
             let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();
             format!("faces = {{ face = {}{depth} }}", faces(face))

@@ -12,6 +12,7 @@ mod contacts;
 mod cursor;
 mod curves;
 mod effects;
+mod face;
 mod fibres;
 mod interpret;
 mod lock;
@@ -24,6 +25,7 @@ mod tree;
 mod units;
 
 pub use curves::Curves;
+pub use face::{FACE, built_in_face};
 pub use fibres::{
     AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
 };
@@ -228,11 +230,13 @@ fn interpret_text(
     let mut root = Source::new(file, text).tree().map_err(Error::all)?;
     let mistakes = Mistakes::default();
     flatten_controls(&mut root);
+    face::expand_muscles(&mut root);
     for (index, argument) in overrides.iter().enumerate() {
         if let Err(mistake) = overrides::apply(&mut root, argument, index + 1) {
             mistakes.add(mistake);
         }
         flatten_controls(&mut root);
+        face::expand_muscles(&mut root);
     }
     for path in without {
         if let Err(mistake) = overrides::remove(&mut root, path) {

@@ -43,6 +43,11 @@ impl References {
         &self.folder
     }
 
+    /// Whether files that the problem names are read.
+    pub fn reads_files(&self) -> bool {
+        self.on_disk
+    }
+
     /// The names of all muscles, in the order of the file.
     pub fn muscles(&self) -> Vec<String> {
         self.muscles.clone()
@@ -199,7 +204,7 @@ fn nodes(control: &Item, muscle: Option<&MuscleSpec>) -> Option<ControlValue> {
     // the nodes of a mesh in a file are counted when the model is built
     let count = muscle.and_then(|muscle| match &muscle.geometry {
         GeometrySpec::Block(block) => Some(block.nodes()),
-        GeometrySpec::Blocks(_) | GeometrySpec::Exf(_) => None,
+        _ => None,
     });
     match count {
         Some(count) if count != values.len() => control.wrong_length(

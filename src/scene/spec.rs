@@ -5,8 +5,11 @@
 
 use super::units::Units;
 use crate::error::Place;
+use crate::math::factor::Precision;
+use crate::mesh::facial::{BodySide, Facial};
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What to do with the problem: `[task] kind`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -39,6 +42,43 @@ pub enum GeometrySpec {
     Blocks(Vec<NamedBlockSpec>),
     /// An EX file: `exf = "face.exf"`, and which of its fields holds the coordinates.
     Exf(ExfSpec),
+    /// A face. Only of the host.
+    Face(FaceMeshSpec),
+    /// A muscle of the face. Only of a muscle.
+    FaceMuscle(FaceMuscleSpec),
+}
+
+/// The face of a person: `[mesh] face`.
+#[derive(Debug, Clone, Serialize)]
+pub struct FaceMeshSpec {
+    /// A file with landmarks and muscles in place of those that are built in.
+    pub landmarks: Option<PathBuf>,
+    /// Elements through the thickness, 1 to 8.
+    pub layers: usize,
+    /// Whether each element is cut in four along the surface.
+    pub halved: bool,
+    /// Whether it is the left half only.
+    pub half: bool,
+    /// What the file says, on top of what is built in.
+    #[serde(skip)]
+    pub face: Arc<Facial>,
+}
+
+/// A muscle of the face: `[[muscle]] face`.
+#[derive(Debug, Clone, Serialize)]
+pub struct FaceMuscleSpec {
+    /// Its name in the face, for example `zygomaticus_major`.
+    pub name: String,
+    /// On which side.
+    #[serde(serialize_with = "side_letter")]
+    pub side: BodySide,
+    /// The face.
+    #[serde(skip)]
+    pub face: Arc<Facial>,
+}
+
+fn side_letter<S: serde::Serializer>(side: &BodySide, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(side.letter())
 }
 
 /// A mesh in an EX file, in mm.
@@ -225,6 +265,8 @@ pub enum FibresSpec {
     Nodes(Vec<[f64; 3]>),
     /// `angles_field`: a field of the muscle's EX file, in radians there.
     Field(String),
+    /// Those of a muscle of the face.
+    Face,
 }
 
 /// The constants of the fibre law of Blemker et al. 2005.
@@ -307,6 +349,8 @@ pub enum FaceName {
         /// 0 or 1: where that coordinate is smallest or greatest.
         end: usize,
     },
+    /// `"lip.upper"`: a part of a face; one of [`FACES`](crate::mesh::facial::FACES).
+    OfFace(String),
     /// `"lip:xi1=0"`: a side of one of several blocks.
     OfBlock {
         /// The name of the block.
@@ -331,6 +375,7 @@ impl std::fmt::Display for FaceName {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             FaceName::Boundary => write!(out, "boundary"),
+            FaceName::OfFace(name) => write!(out, "{name}"),
             FaceName::Side { direction, end } => write!(out, "xi{}={end}", direction + 1),
             FaceName::OfBlock { block, direction, end } => write!(out, "{block}:xi{}={end}", direction + 1),
             FaceName::OfElement { element, direction, end } => write!(out, "{element}:xi{}={end}", direction + 1),
@@ -409,8 +454,9 @@ pub enum SurfaceSpec {
         /// Whether the body is inside.
         inside: bool,
     },
-    /// The face itself, where it was before anything moved; the body is on its own side of it.
-    Reference,
+    /// A face of the host where it was before anything moved; the body is on its own side of it. `None`: the face that
+    /// meets it.
+    Reference(Option<FaceSpec>),
     /// Other faces of the host, which yield; not for sliding.
     Faces {
         /// The faces.
@@ -802,6 +848,8 @@ pub struct SolverSpec {
     pub step_max: f64,
     /// The smallest part of the load path before the solver gives up; not above `step_max`.
     pub step_min: f64,
+    /// In which numbers the tangent is factorised; solutions are refined in double precision.
+    pub precision: Precision,
 }
 
 /// What is written beside the tables: `[output]`.

@@ -13,6 +13,8 @@ pub struct Study {
     pub name: String,
     /// The problem that is solved, absolute.
     pub problem: PathBuf,
+    /// What is changed in all variants and the reference.
+    pub base: Change,
     /// Which combinations of the factors are solved.
     pub design: Design,
     /// What may differ from variant to variant.
@@ -184,6 +186,7 @@ pub(super) fn study(root: &Node, default_name: &str, folder: &Path, mistakes: &M
 
 fn body(table: &mut Table, folder: &Path) -> Option<Study> {
     let problem = table.required("problem", "problem = \"../slab/problem.toml\"", |item| existing(&item, folder));
+    let base = change(table);
     let designs = [("grid", Design::Grid), ("one-at-a-time", Design::OneAtATime)];
     let design = table.or("design", Design::Grid, |item| item.choice(&designs, &[]));
     let factors = table.tables("vary", factor);
@@ -197,17 +200,22 @@ fn body(table: &mut Table, folder: &Path) -> Option<Study> {
     let repetitions = table.or("repetitions", 3, |item| item.whole(1, 1000));
     let estimate = table.or("estimate", false, |item| item.flag());
     let target = table.optional("target", |item| item.number(POSITIVE));
-    let (factors, variants) = (factors?, variants?);
+    let (factors, variants, base) = (factors?, variants?, base?);
+    let reference = match reference? {
+        ReferenceSpec::Variant(change) => ReferenceSpec::Variant(base.then(&change)),
+        known => known,
+    };
     if factors.is_empty() && variants.is_empty() {
         table.must_hold("vary", "[[study.vary]]\nkey = \"tissue.kappa_kpa\"\nvalues = [0, 1, 10]");
     }
     Some(Study {
         name: String::new(),
         problem: problem?,
+        base,
         design: design?,
         factors,
         variants,
-        reference: reference?,
+        reference,
         measure: measure?,
         repetitions: repetitions?,
         estimate: estimate?,
@@ -234,11 +242,22 @@ fn factor(table: &mut Table) -> Option<Factor> {
         let values = item.list("a list of values", |value| Some(value.node.to_toml()))?;
         if values.is_empty() { item.wrong_length("no entry", "at least one value") } else { Some(values) }
     })?;
+    let labels = table.optional("labels", |item| {
+        let labels = item.list("a list of labels", |label| label.name())?;
+        match values.as_ref().map(Vec::len) {
+            Some(expected) if expected != labels.len() => {
+                item.wrong_length(&format!("{} labels", labels.len()), &format!("{expected}, one for each value"))
+            }
+            _ => Some(labels),
+        }
+    })?;
     let without = table.optional("without", |item| item.name())?;
     let level = |label: String, change: Change| Level { label, change };
     let (default, levels) = match (key, values, without) {
         (Some(key), Some(values), None) => {
-            let levels = values.into_iter().map(|value| level(value.clone(), setting(&key, &value))).collect();
+            let labels = labels.unwrap_or_else(|| values.clone());
+            let levels =
+                labels.into_iter().zip(&values).map(|(label, value)| level(label, setting(&key, value))).collect();
             (key.rsplit('.').next().unwrap_or_default().to_owned(), levels)
         }
         (None, None, Some(gone)) => {

@@ -27,11 +27,14 @@ pub fn variants(study: &Study) -> Vec<Variant> {
         let chosen = study.factors.iter().zip(&levels).map(|(factor, level)| (factor, &factor.levels[*level]));
         let named: Vec<String> =
             chosen.clone().map(|(factor, level)| format!("{} = {}", factor.name, level.label)).collect();
-        let change = chosen.fold(Change::default(), |change, (_, level)| change.then(&level.change));
+        let change = chosen.fold(study.base.clone(), |change, (_, level)| change.then(&level.change));
         Variant { name: named.join(", "), levels: Some(levels), change }
     };
-    let spelled =
-        study.variants.iter().map(|v| Variant { name: v.name.clone(), levels: None, change: v.change.clone() });
+    let spelled = study.variants.iter().map(|v| Variant {
+        name: v.name.clone(),
+        levels: None,
+        change: study.base.then(&v.change),
+    });
     combinations.into_iter().map(of_levels).chain(spelled).collect()
 }
 

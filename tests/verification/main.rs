@@ -11,6 +11,7 @@ mod cylinder_inflation;
 mod free_contraction;
 mod hertz;
 mod patch_test;
+mod precision;
 mod prescribed_state;
 mod rivlin_torsion;
 mod solved_cases;

@@ -12,6 +12,7 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, ColMut, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
+use super::scalar::Scalar;
 use super::tree::{Front, Run};
 use crate::math::sparse::SymmetricMatrix;
 
@@ -23,35 +24,34 @@ const CHUNK: usize = 256;
 const LEAST_SHARED: f64 = 2e7;
 
 /// L and B of one front.
-#[derive(Default)]
-pub(super) struct Panel {
+pub(super) struct Panel<T> {
     /// L11 with the diagonal of B, above L21; by columns.
-    pub values: Vec<f64>,
+    pub values: Vec<T>,
     /// Entries of B below its diagonal, 0 where a block of order 1 ends; one per pivot.
-    pub subdiagonal: Vec<f64>,
+    pub subdiagonal: Vec<T>,
     /// Pivot eliminated at each place, counted from the first of its block.
     pub exchanges: Vec<usize>,
     /// The inverse of `exchanges`.
     inverse: Vec<usize>,
 }
 
-impl Panel {
+impl<T: Scalar> Panel<T> {
     /// Reserves the memory for `front`; `None` if there is not enough.
     pub fn new(front: &Front) -> Option<Self> {
         let (width, entries) = (front.width(), front.width() * front.height());
         let mut values = Vec::new();
         values.try_reserve_exact(entries).ok()?;
-        values.resize(entries, 0.0);
+        values.resize(entries, T::default());
         Some(Self {
             values,
-            subdiagonal: vec![0.0; width],
+            subdiagonal: vec![T::default(); width],
             exchanges: (0..width).collect(),
             inverse: (0..width).collect(),
         })
     }
 
     /// L11 and L21.
-    pub fn blocks(&self, front: &Front) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+    pub fn blocks(&self, front: &Front) -> (MatRef<'_, T>, MatRef<'_, T>) {
         MatRef::from_column_major_slice(&self.values, front.height(), front.width()).split_at_row(front.width())
     }
 }
@@ -59,18 +59,18 @@ impl Panel {
 /// The lower triangle of what a front adds to its parent.
 ///
 /// Stored are strips of [`STRIP`] columns, each a matrix by columns that starts at the row of its first column.
-pub(super) struct Contribution {
+pub(super) struct Contribution<T> {
     order: usize,
-    values: Vec<f64>,
+    values: Vec<T>,
 }
 
-impl Contribution {
+impl<T> Contribution<T> {
     fn entries(order: usize) -> usize {
         (0..order).step_by(STRIP).map(|first| (order - first) * STRIP.min(order - first)).sum()
     }
 
     /// Rows from `j` down of column `j`.
-    fn column(&self, j: usize) -> &[f64] {
+    fn column(&self, j: usize) -> &[T] {
         let (strip, first) = (j / STRIP, j - j % STRIP);
         let before = STRIP * (strip * self.order) - STRIP * STRIP * strip * strip.saturating_sub(1) / 2;
         let height = self.order - first;
@@ -80,16 +80,21 @@ impl Contribution {
 }
 
 /// Memory that is used again: a fresh page costs more than a product that fills it.
-#[derive(Default)]
-pub(super) struct Pool(Mutex<Vec<Vec<f64>>>);
+pub(super) struct Pool<T>(Mutex<Vec<Vec<T>>>);
 
-impl Pool {
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Pool(Mutex::default())
+    }
+}
+
+impl<T: Scalar> Pool<T> {
     /// `len` numbers of any value; `None` if there is no memory.
-    fn take(&self, len: usize) -> Option<Vec<f64>> {
+    fn take(&self, len: usize) -> Option<Vec<T>> {
         let mut buffer = {
             let mut free = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             // the tightest that is large enough, else the largest
-            let fit = |buffer: &Vec<f64>| match buffer.capacity() {
+            let fit = |buffer: &Vec<T>| match buffer.capacity() {
                 capacity if capacity >= len => (0, capacity),
                 capacity => (1, usize::MAX - capacity),
             };
@@ -102,40 +107,41 @@ impl Pool {
             buffer.clear();
             buffer.try_reserve_exact(len).ok()?;
         }
-        buffer.resize(len, 0.0);
+        buffer.resize(len, T::default());
         Some(buffer)
     }
 
-    fn give(&self, buffer: Vec<f64>) {
+    fn give(&self, buffer: Vec<T>) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(buffer);
     }
 }
 
 /// What all fronts of a factorisation read.
-pub(super) struct Source<'a> {
+pub(super) struct Source<'a, T> {
     pub matrix: &'a SymmetricMatrix,
     /// The equilibration.
     pub scale: &'a [f64],
-    pub pool: &'a Pool,
+    pub pool: &'a Pool<T>,
 }
 
-impl Source<'_> {
+impl<T: Scalar> Source<'_, T> {
     /// Fills `panel` and returns the contribution to the parent; `None` if there is no memory.
     ///
     /// `children`: each child with its contribution, which is given back.
     pub fn factor(
         &self,
         front: &Front,
-        panel: &mut Panel,
-        children: Vec<(&Front, Contribution)>,
-    ) -> Option<Contribution> {
+        panel: &mut Panel<T>,
+        children: Vec<(&Front, Contribution<T>)>,
+    ) -> Option<Contribution<T>> {
         let (width, below) = (front.width(), front.below);
         let is_shared = front.flops > LEAST_SHARED;
         self.assemble(front, &mut panel.values, &children);
 
         let mut product = self.pool.take((width + below) * width)?;
         eliminate(front, panel, &mut product, is_shared)?;
-        let mut contribution = Contribution { order: below, values: self.pool.take(Contribution::entries(below))? };
+        let mut contribution =
+            Contribution { order: below, values: self.pool.take(Contribution::<T>::entries(below))? };
         let (_, l21) = panel.blocks(front);
         let times_b = MatRef::from_column_major_slice(&product, width + below, width).split_at_row(width).1;
         let mut strips = Vec::new();
@@ -161,10 +167,10 @@ impl Source<'_> {
                 BlockStructure::Rectangular,
                 bl.transpose(),
                 BlockStructure::Rectangular,
-                -1.0,
+                T::round(-1.0),
                 Par::Seq,
             );
-            matmul(rectangle, Accum::Replace, l_rectangle, bl.transpose(), -1.0, Par::Seq);
+            matmul(rectangle, Accum::Replace, l_rectangle, bl.transpose(), T::round(-1.0), Par::Seq);
             for (child, added) in &children {
                 let columns = columns.start + width..columns.end + width;
                 add_columns(added, &child.to_parent, columns.clone(), columns.start, rows, strip);
@@ -178,17 +184,17 @@ impl Source<'_> {
     }
 
     /// Memory that a contribution no longer needs.
-    pub fn release(&self, contribution: Contribution) {
+    pub fn release(&self, contribution: Contribution<T>) {
         self.pool.give(contribution.values);
     }
 
     /// Adds the entries of the matrix and the contributions of the children to the columns of the pivots.
-    fn assemble(&self, front: &Front, values: &mut [f64], children: &[(&Front, Contribution)]) {
+    fn assemble(&self, front: &Front, values: &mut [T], children: &[(&Front, Contribution<T>)]) {
         let pattern = &*self.matrix.pattern;
         let height = front.height();
         let strips: Vec<_> = values.chunks_mut(STRIP * height).enumerate().collect();
         for_each(front.flops > LEAST_SHARED, strips, |(strip, values)| {
-            values.fill(0.0);
+            values.fill(T::default());
             let first = strip * STRIP;
             for (child, added) in children {
                 add_columns(added, &child.to_parent, first..first + values.len() / height, 0, height, values);
@@ -207,11 +213,14 @@ impl Source<'_> {
                 if block.transposed {
                     let first = block.place[0] + a + block.place[1] * height;
                     let row = values[first..].iter_mut().step_by(height);
-                    row.zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f += a * s * t);
+                    row.zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f += T::round(a * s * t));
                 } else {
                     let first = block.place[0] + skipped + (block.place[1] + a) * height;
                     let column = &mut values[first..first + entries.len()];
-                    column.iter_mut().zip(entries.iter().zip(scale)).for_each(|(f, (a, t))| *f += a * s * t);
+                    column
+                        .iter_mut()
+                        .zip(entries.iter().zip(scale))
+                        .for_each(|(f, (a, t))| *f += T::round(a * s * t));
                 }
             }
         }
@@ -221,13 +230,13 @@ impl Source<'_> {
 /// Adds to `columns` of the parent, counted from its first pivot, what a child contributes to them.
 ///
 /// `values` holds these columns, of `height` rows each, from row `first_row` of the parent down.
-fn add_columns(
-    child: &Contribution,
+fn add_columns<T: Scalar>(
+    child: &Contribution<T>,
     runs: &[Run],
     columns: Range<usize>,
     first_row: usize,
     height: usize,
-    values: &mut [f64],
+    values: &mut [T],
 ) {
     for (place, run) in runs.iter().enumerate() {
         for to in run.to.max(columns.start)..(run.to + run.len).min(columns.end) {
@@ -239,7 +248,7 @@ fn add_columns(
                 let (added, rest) = source.split_at(rows.len);
                 source = rest;
                 let start = rows.to - first_row;
-                target[start..start + rows.len].iter_mut().zip(added).for_each(|(t, s)| *t += s);
+                target[start..start + rows.len].iter_mut().zip(added).for_each(|(t, s)| *t += *s);
             }
         }
     }
@@ -253,14 +262,14 @@ fn add_columns(
 /// ```
 ///
 /// P stays in the block: rows of L that belong to a later block are in the order before its exchanges.
-fn eliminate(front: &Front, panel: &mut Panel, product: &mut [f64], is_shared: bool) -> Option<()> {
+fn eliminate<T: Scalar>(front: &Front, panel: &mut Panel<T>, product: &mut [T], is_shared: bool) -> Option<()> {
     let (width, height) = (front.width(), front.height());
     let mut l = MatMut::from_column_major_slice_mut(&mut panel.values, height, width);
     let mut product = MatMut::from_column_major_slice_mut(product, height, width);
     let widest = front.pivot_blocks.iter().map(ExactSizeIterator::len).max()?;
-    let need = cholesky_in_place_scratch::<usize, f64>(widest, Par::Seq, Default::default());
+    let need = cholesky_in_place_scratch::<usize, T>(widest, Par::Seq, Default::default());
     let mut scratch = MemBuffer::try_new(need).ok()?;
-    panel.subdiagonal.fill(0.0);
+    panel.subdiagonal.fill(T::default());
     for block in &front.pivot_blocks {
         let (start, len) = (block.start, block.len());
         let (before, columns) = l.rb_mut().split_at_col_mut(start);
@@ -269,7 +278,7 @@ fn eliminate(front: &Front, panel: &mut Panel, product: &mut [f64], is_shared: b
         let (products_before, products) = product.rb_mut().split_at_col_mut(start);
         let of_block = products_before.rb().subrows(start, len);
         let (mut pivots, rows) = columns.subcols_mut(0, len).split_at_row_mut(len);
-        matmul(pivots.rb_mut(), Accum::Add, before.subrows(0, len), of_block.transpose(), -1.0, Par::Seq);
+        matmul(pivots.rb_mut(), Accum::Add, before.subrows(0, len), of_block.transpose(), T::round(-1.0), Par::Seq);
         let subdiagonal = &mut panel.subdiagonal[block.clone()];
         let exchanges = &mut panel.exchanges[block.clone()];
         cholesky_in_place(
@@ -287,7 +296,7 @@ fn eliminate(front: &Front, panel: &mut Panel, product: &mut [f64], is_shared: b
         let chunks: Vec<_> = chunks_of_rows(rows).into_iter().zip(chunks_of_rows(products)).enumerate().collect();
         for_each(is_shared, chunks, |(chunk, (mut rows, product))| {
             let before = before.subrows(len + chunk * CHUNK, rows.nrows());
-            matmul(rows.rb_mut(), Accum::Add, before, of_block.transpose(), -1.0, Par::Seq);
+            matmul(rows.rb_mut(), Accum::Add, before, of_block.transpose(), T::round(-1.0), Par::Seq);
             solve_rows(pivots, subdiagonal, exchanges, rows, product);
         });
     }
@@ -295,7 +304,7 @@ fn eliminate(front: &Front, panel: &mut Panel, product: &mut [f64], is_shared: b
 }
 
 /// The rows of a matrix in pieces of [`CHUNK`].
-fn chunks_of_rows(matrix: MatMut<'_, f64>) -> Vec<MatMut<'_, f64>> {
+fn chunks_of_rows<T>(matrix: MatMut<'_, T>) -> Vec<MatMut<'_, T>> {
     let mut chunks = Vec::new();
     let mut rest = matrix;
     while rest.nrows() > 0 {
@@ -308,12 +317,12 @@ fn chunks_of_rows(matrix: MatMut<'_, f64>) -> Vec<MatMut<'_, f64>> {
 }
 
 /// `rows` holds rows below a block of pivots and receives those of L; `product` receives L B.
-fn solve_rows(
-    pivots: MatRef<'_, f64>,
-    subdiagonal: &[f64],
+fn solve_rows<T: Scalar>(
+    pivots: MatRef<'_, T>,
+    subdiagonal: &[T],
     exchanges: &[usize],
-    mut rows: MatMut<'_, f64>,
-    mut product: MatMut<'_, f64>,
+    mut rows: MatMut<'_, T>,
+    mut product: MatMut<'_, T>,
 ) {
     for (j, &pivot) in exchanges.iter().enumerate() {
         product.rb_mut().col_mut(j).copy_from(rows.rb().col(pivot));
@@ -322,10 +331,10 @@ fn solve_rows(
     let product = product.rb();
     let mut j = 0;
     while j < exchanges.len() {
-        if subdiagonal[j] == 0.0 {
-            let inverse = 1.0 / pivots[(j, j)];
+        if subdiagonal[j] == T::default() {
+            let inverse = T::round(1.0) / pivots[(j, j)];
             let column = rows.rb_mut().col_mut(j);
-            column.iter_mut().zip(product.col(j).iter()).for_each(|(l, p)| *l = p * inverse);
+            column.iter_mut().zip(product.col(j).iter()).for_each(|(l, p)| *l = *p * inverse);
             j += 1;
         } else {
             let inverse = Inverse::new(pivots[(j, j)], subdiagonal[j], pivots[(j + 1, j + 1)]);
@@ -344,25 +353,26 @@ fn solve_rows(
 /// | b  d |    = -------------  |  -1   a/b |
 ///                b (ad/b^2 - 1)
 /// ```
-pub(super) struct Inverse {
-    a: f64,
-    d: f64,
-    factor: f64,
+pub(super) struct Inverse<T> {
+    a: T,
+    d: T,
+    factor: T,
 }
 
-impl Inverse {
-    pub fn new(a: f64, b: f64, d: f64) -> Self {
+impl<T: Scalar> Inverse<T> {
+    pub fn new(a: T, b: T, d: T) -> Self {
+        let one = T::round(1.0);
         let (a, d) = (a / b, d / b);
-        Self { a, d, factor: 1.0 / (b * (a * d - 1.0)) }
+        Self { a, d, factor: one / (b * (a * d - one)) }
     }
 
-    pub fn apply(&self, x: f64, y: f64) -> [f64; 2] {
+    pub fn apply(&self, x: T, y: T) -> [T; 2] {
         [self.factor * (self.d * x - y), self.factor * (self.a * y - x)]
     }
 }
 
 /// Calls `f` for every item, on all threads if `is_shared`; what an item gets does not depend on it.
-fn for_each<T: Send>(is_shared: bool, items: Vec<T>, f: impl Fn(T) + Sync + Send) {
+fn for_each<I: Send>(is_shared: bool, items: Vec<I>, f: impl Fn(I) + Sync + Send) {
     if is_shared {
         items.into_par_iter().for_each(f);
     } else {

@@ -6,14 +6,15 @@ use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::front::{Inverse, Panel};
+use super::scalar::Scalar;
 use super::tree::{Front, Tree};
 
 /// x <- (L B L^T)^-1 x for `columns` vectors in the order of elimination, stored one after the other.
-pub(super) fn solve(tree: &Tree, panels: &[Panel], x: &mut [f64], columns: usize) {
+pub(super) fn solve<T: Scalar>(tree: &Tree, panels: &[Panel<T>], x: &mut [T], columns: usize) {
     let n = tree.permutation.len();
     let largest = |rows: fn(&Front) -> usize| tree.fronts.iter().map(rows).max().unwrap_or(0);
-    let mut pivots = vec![0.0; largest(Front::width) * columns];
-    let mut below = vec![0.0; largest(|front| front.below) * columns];
+    let mut pivots = vec![T::default(); largest(Front::width) * columns];
+    let mut below = vec![T::default(); largest(|front| front.below) * columns];
     for (front, panel) in tree.fronts.iter().zip(panels) {
         let y = &mut pivots[..front.width() * columns];
         let z = &mut below[..front.below * columns];
@@ -34,7 +35,7 @@ pub(super) fn solve(tree: &Tree, panels: &[Panel], x: &mut [f64], columns: usize
 }
 
 /// y <- L11^-1 y, z <- L21 y, with the exchanges of each block of pivots before its elimination.
-fn forward(front: &Front, panel: &Panel, y: &mut [f64], z: &mut [f64], columns: usize) {
+fn forward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &mut [T], columns: usize) {
     let (l11, l21) = panel.blocks(front);
     let width = front.width();
     let mut y = MatMut::from_column_major_slice_mut(y, width, columns);
@@ -49,25 +50,25 @@ fn forward(front: &Front, panel: &Panel, y: &mut [f64], z: &mut [f64], columns: 
         }
         let (l, l_later) = l11.submatrix(start, start, width - start, len).split_at_row(len);
         solve_unit_lower_triangular_in_place(l, y.rb_mut(), Par::Seq);
-        matmul(later, Accum::Add, l_later, y.rb(), -1.0, Par::Seq);
+        matmul(later, Accum::Add, l_later, y.rb(), T::round(-1.0), Par::Seq);
     }
     let z = MatMut::from_column_major_slice_mut(z, front.below, columns);
-    matmul(z, Accum::Replace, l21, y.rb(), 1.0, Par::Seq);
+    matmul(z, Accum::Replace, l21, y.rb(), T::round(1.0), Par::Seq);
 }
 
 /// y <- L11^-T (y - L21^T z), the exchanges of each block of pivots undone after it.
-fn backward(front: &Front, panel: &Panel, y: &mut [f64], z: &[f64], columns: usize) {
+fn backward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &[T], columns: usize) {
     let (l11, l21) = panel.blocks(front);
     let width = front.width();
     let mut y = MatMut::from_column_major_slice_mut(y, width, columns);
     let z = MatRef::from_column_major_slice(z, front.below, columns);
-    matmul(y.rb_mut(), Accum::Add, l21.transpose(), z, -1.0, Par::Seq);
+    matmul(y.rb_mut(), Accum::Add, l21.transpose(), z, T::round(-1.0), Par::Seq);
     let mut before = Vec::new();
     for block in front.pivot_blocks.iter().rev() {
         let (start, len) = (block.start, block.len());
         let (mut y, later) = y.rb_mut().subrows_mut(start, width - start).split_at_row_mut(len);
         let (l, l_later) = l11.submatrix(start, start, width - start, len).split_at_row(len);
-        matmul(y.rb_mut(), Accum::Add, l_later.transpose(), later.rb(), -1.0, Par::Seq);
+        matmul(y.rb_mut(), Accum::Add, l_later.transpose(), later.rb(), T::round(-1.0), Par::Seq);
         solve_unit_upper_triangular_in_place(l.transpose(), y.rb_mut(), Par::Seq);
         for mut y in y.col_iter_mut() {
             before.clear();
@@ -77,18 +78,18 @@ fn backward(front: &Front, panel: &Panel, y: &mut [f64], z: &[f64], columns: usi
     }
 }
 
-fn copy_pivots(front: &Front, x: &[f64], n: usize, y: &mut [f64]) {
+fn copy_pivots<T: Copy>(front: &Front, x: &[T], n: usize, y: &mut [T]) {
     let pivots = front.pivots.clone();
     x.chunks(n).zip(y.chunks_mut(front.width())).for_each(|(x, y)| y.copy_from_slice(&x[pivots.clone()]));
 }
 
-fn write_pivots(front: &Front, y: &[f64], x: &mut [f64], n: usize) {
+fn write_pivots<T: Copy>(front: &Front, y: &[T], x: &mut [T], n: usize) {
     let pivots = front.pivots.clone();
     x.chunks_mut(n).zip(y.chunks(front.width())).for_each(|(x, y)| x[pivots.clone()].copy_from_slice(y));
 }
 
 /// Calls `f` with each run of rows below the pivots, in `x` and in `z`, which holds these rows alone.
-fn for_each_run(front: &Front, n: usize, x: &mut [f64], z: &mut [f64], f: impl Fn(&mut [f64], &mut [f64])) {
+fn for_each_run<T>(front: &Front, n: usize, x: &mut [T], z: &mut [T], f: impl Fn(&mut [T], &mut [T])) {
     if front.below == 0 {
         return;
     }
@@ -102,14 +103,14 @@ fn for_each_run(front: &Front, n: usize, x: &mut [f64], z: &mut [f64], f: impl F
 }
 
 /// y <- B^-1 y.
-fn divide_by_pivots(front: &Front, panel: &Panel, y: &mut [f64]) {
+fn divide_by_pivots<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T]) {
     let (l11, _) = panel.blocks(front);
     let width = front.width();
     let mut j = 0;
     while j < width {
         let below = panel.subdiagonal[j];
-        if below == 0.0 {
-            let inverse = 1.0 / l11[(j, j)];
+        if below == T::default() {
+            let inverse = T::round(1.0) / l11[(j, j)];
             y.chunks_mut(width).for_each(|y| y[j] *= inverse);
             j += 1;
         } else {
