@@ -196,6 +196,10 @@ fn a_ring_turns_around() {
     assert!(fit.warnings.iter().any(|warning| warning.code == "F009"));
     // the EX file keeps it
     let text = write_mesh(&mesh, &[("coordinates", &mesh.parameters)]) + &write_angles(&mesh, "fibres", &fit.angles);
+    // Zinc refuses a second definition of a template
+    let mut definitions: Vec<&str> = text.lines().filter(|line| line.starts_with("Define")).collect();
+    definitions.sort_unstable();
+    assert!(definitions.len() == 6 && definitions.windows(2).all(|pair| pair[0] != pair[1]), "{definitions:?}");
     let file = ExFile::parse(&text, "ring.exf").unwrap();
     let geometry = file.geometry(None).unwrap();
     let read = file.angles("fibres", &geometry).unwrap();

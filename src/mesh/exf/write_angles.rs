@@ -18,16 +18,21 @@ pub fn write_angles(mesh: &Mesh, name: &str, angles: &FibreAngles) -> String {
         }
     }
     let mut text = String::from("!#nodeset nodes\n");
+    // a template is defined once: the count of versions of each
+    let mut defined: Vec<usize> = Vec::new();
     let mut current = 0;
     for (node, values) in versions.iter().enumerate() {
         if values.len() != current {
             current = values.len();
-            let labels = if current > 1 { format!("value({current})") } else { "value".into() };
-            put(&mut text, format!("Define node template: {name}{current}\nShape. Dimension=0\n#Fields=1\n"));
-            put(&mut text, field_line(name));
-            COMPONENTS
-                .iter()
-                .for_each(|component| put(&mut text, format!(" {component}. #Values={current} ({labels})\n")));
+            if !defined.contains(&current) {
+                defined.push(current);
+                let labels = if current > 1 { format!("value({current})") } else { "value".into() };
+                put(&mut text, format!("Define node template: {name}{current}\nShape. Dimension=0\n#Fields=1\n"));
+                put(&mut text, field_line(name));
+                COMPONENTS
+                    .iter()
+                    .for_each(|component| put(&mut text, format!(" {component}. #Values={current} ({labels})\n")));
+            }
             put(&mut text, format!("Node template: {name}{current}\n"));
         }
         put(&mut text, format!("Node: {}\n", node + 1));
