@@ -67,6 +67,7 @@
 
 pub mod cli;
 pub mod error;
+pub mod fibres;
 pub mod fit;
 pub mod forward;
 pub mod markers;

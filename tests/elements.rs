@@ -402,7 +402,7 @@ fn fibre_angles_have_their_signs() {
 fn fibre_angles_are_interpolated() {
     let mesh = curved_block(&TricubicHermite, [2, 1, 1], 0.05, 16);
     let mut random = Random::new(17);
-    let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
+    let angles = FibreAngles::at_nodes((0..mesh.nodes).map(|_| random.triple()).collect());
     for corner in 0..8 {
         let xi = ends(corner).map(|end| end as f64);
         assert_eq!(angles.at(&mesh, 1, xi), angles.nodes[mesh.corners[1][corner]]);

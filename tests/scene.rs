@@ -239,7 +239,6 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     expect("risorius.L = 0.05", "masseter = 0.05", "C009", "masseter", "muscles: slab, risorius.L");
     expect("risorius.L = 0.05", "risorius.l = 0.05", "C009", "risorius.l", "did you mean `risorius.L`?");
     // C010 not in this version
-    expect("kind = \"fit\"", "kind = \"fibres\"", "C010", "\"fibres\"", "this version has \"forward\", \"fit\"");
     expect("\"trilinear\"", "\"constant\"", "C010", "\"constant\"", "one pressure per element");
     // C011 not exactly one
     let both = "clamp = { face = \"xi1=0\" }\nsymmetry = { face = \"xi1=0\" }";

@@ -67,7 +67,7 @@ fn twisted(element: &'static dyn Element) -> (Mesh, FibreAngles) {
     let mut mesh = block(element, [3.0, 4.0, 3.0], [14.0, 11.0, 4.0], [2, 1, 1]);
     let mut random = Random::new(22);
     mesh.parameters.iter_mut().flatten().for_each(|x| *x += 0.2 * random.next());
-    let angles = FibreAngles { nodes: (0..mesh.nodes).map(|_| random.triple()).collect() };
+    let angles = FibreAngles::at_nodes((0..mesh.nodes).map(|_| random.triple()).collect());
     (mesh, angles)
 }
 

@@ -3,7 +3,7 @@
 use super::prepare::{Clip, Prepared, prepare};
 use super::problem::Source;
 use super::terminal::print;
-use super::{Ending, Flags, study};
+use super::{Ending, Flags, fibres, study};
 use crate::error::{Missing, Result};
 use crate::model::Model;
 use crate::model::halved::Halved;
@@ -11,10 +11,12 @@ use crate::scene::{ControlRange, Problem, Scene, Task};
 use std::path::Path;
 
 pub(super) fn check(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
-    if let Some(path) = path
-        && let Problem::Study(study) = Problem::read(path, &flags.set)?
-    {
-        return study::check(&study);
+    if let Some(path) = path {
+        match Problem::read(path, &flags.set)? {
+            Problem::Study(study) => return study::check(&study),
+            Problem::Fibres(problem) => return fibres::check(&problem),
+            Problem::Scene(_) => {}
+        }
     }
     let source = Source::read(path, flags)?;
     let Prepared { built, clip, halved, warnings } = prepare(&source)?;

@@ -6,6 +6,7 @@
 mod check;
 pub mod diagnostics;
 mod estimate;
+mod fibres;
 mod fit;
 mod forward;
 mod inspect;

@@ -5,7 +5,7 @@ use super::prepare::{Prepared, prepare};
 use super::problem::Source;
 use super::progress::Meter;
 use super::terminal::tell;
-use super::{Ending, Flags, fit, forward, study};
+use super::{Ending, Flags, fibres, fit, forward, study};
 use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
@@ -69,11 +69,15 @@ impl Run {
 }
 
 pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
-    if let Some(path) = path
-        && let Problem::Study(study) = Problem::read(path, &flags.set)?
-    {
-        let study = Study { estimate: study.estimate || flags.estimate, ..*study };
-        return study::run(&study, path, flags);
+    if let Some(path) = path {
+        match Problem::read(path, &flags.set)? {
+            Problem::Study(study) => {
+                let study = Study { estimate: study.estimate || flags.estimate, ..*study };
+                return study::run(&study, path, flags);
+            }
+            Problem::Fibres(problem) => return fibres::run(&problem, path, flags),
+            Problem::Scene(_) => {}
+        }
     }
     let start = Instant::now();
     let mut source = Source::read(path, flags)?;

@@ -682,6 +682,32 @@ pub enum Error {
         /// The change at which the fit counts as converged.
         required: f64,
     },
+    /// A file is not what measured directions are read from.
+    #[error("{}: {message}", path.display())]
+    Axes {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: Box<str>,
+    },
+    /// No measured direction lies in the mesh.
+    #[error(
+        "none of the {count} measured axes lies in the mesh: the nearest is {:.3} mm from it, the farthest {:.3} mm", distance[0], distance[1]
+    )]
+    NoAxes {
+        /// Axes outside the mesh.
+        count: usize,
+        /// Distance of the nearest and of the farthest, mm.
+        distance: [f64; 2],
+        /// The table `[fibres]`.
+        place: Box<Place>,
+    },
+    /// The normal equations of fibre angles cannot be solved.
+    #[error("the normal equations of the fibre angles cannot be solved: {message}")]
+    FibreSystem {
+        /// What the solver says.
+        message: Box<str>,
+    },
     /// A frame has too few markers.
     #[error("frame {frame} at {time_s:.3} s has no marker at all")]
     NoMarkersInFrame {
@@ -801,6 +827,9 @@ impl Error {
             Error::FactorTooLarge { .. } => "S011",
             Error::NotFactored => "S012",
             Error::StepNotSolved { .. } => "F001",
+            Error::Axes { .. } => "M014",
+            Error::NoAxes { .. } => "K005",
+            Error::FibreSystem { .. } => "F005",
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
@@ -844,6 +873,7 @@ impl Error {
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
+            | Error::NoAxes { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
             Error::Named(named) => Some(&named.1),

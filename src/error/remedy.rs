@@ -121,7 +121,16 @@ impl Error {
                     .into(),
             ),
             Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
-            Error::Optimiser { .. } | Error::NotFinite => None,
+            Error::Axes { .. } => Some(
+                "a table x,y,z,vx,vy,vz as CSV, a field of vectors or tensors in a VTK, VTU or VTP file, lines in one, or a \
+                 field of vectors at the nodes of an EX file is read; write field = \"..\" to choose one of several"
+                    .into(),
+            ),
+            Error::NoAxes { .. } => Some(
+                "check the units of [[fibres.data]] and the place of the mesh; outside = { project_mm = .. } uses axes near it"
+                    .into(),
+            ),
+            Error::Optimiser { .. } | Error::NotFinite | Error::FibreSystem { .. } => None,
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())
             }

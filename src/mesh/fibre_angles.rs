@@ -3,27 +3,41 @@
 use super::element::{Element, Trilinear};
 use super::{Mesh, position_and_jacobian};
 use crate::math::tensor::{Matrix, Vector, cross, normalised};
+use std::collections::BTreeMap;
 
 /// Euler angles (A, B, G) in radians at the nodes of a mesh: fibre angle, imbrication, sheet.
 #[derive(Debug, Clone)]
 pub struct FibreAngles {
     /// One triple per node.
     pub nodes: Vec<[f64; 3]>,
+    /// Elements whose corners have other angles than their nodes: the same axes, with other half turns. A field that
+    /// turns around on its way about a hole has them along a cut; most fields have none.
+    pub own: BTreeMap<usize, [[f64; 3]; 8]>,
 }
 
 impl FibreAngles {
+    /// Angles at nodes, one for all elements that meet there.
+    pub fn at_nodes(nodes: Vec<[f64; 3]>) -> FibreAngles {
+        FibreAngles { nodes, own: BTreeMap::new() }
+    }
+
     /// The same angles everywhere.
     pub fn uniform(mesh: &Mesh, angles: [f64; 3]) -> FibreAngles {
-        FibreAngles { nodes: vec![angles; mesh.nodes] }
+        FibreAngles::at_nodes(vec![angles; mesh.nodes])
+    }
+
+    /// The angles at the corners of an element.
+    pub fn at_corners(&self, mesh: &Mesh, element: usize) -> [[f64; 3]; 8] {
+        self.own.get(&element).copied().unwrap_or_else(|| mesh.corners[element].map(|node| self.nodes[node]))
     }
 
     /// The angles at a point of an element.
     pub fn at(&self, mesh: &Mesh, element: usize, xi: [f64; 3]) -> [f64; 3] {
         let values = Trilinear.values(xi);
         let mut angles = [0.0; 3];
-        for (corner, node) in mesh.corners[element].iter().enumerate() {
-            for (sum, angle) in angles.iter_mut().zip(self.nodes[*node]) {
-                *sum += values[corner] * angle;
+        for (value, corner) in values.iter().zip(self.at_corners(mesh, element)) {
+            for (sum, angle) in angles.iter_mut().zip(corner) {
+                *sum += value * angle;
             }
         }
         angles

@@ -3,6 +3,7 @@
 pub mod bezier;
 pub mod block;
 pub mod continuous;
+pub mod cycled;
 pub mod element;
 pub mod exf;
 pub mod face;

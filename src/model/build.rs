@@ -243,7 +243,10 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
 }
 
 /// The mesh of a muscle, the angles of its fibres, and the warning of its mesh.
-fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
+///
+/// # Errors
+/// An EX file that cannot be read, or that has no such angles.
+pub fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)> {
     let (mesh, file) = match &spec.geometry {
         GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face }) => {
             let course = face.muscle(name).unwrap_or_else(|| unreachable!("checked by the scene"));
@@ -263,7 +266,7 @@ fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warning>)
         FibresSpec::Face => unreachable!("only of a muscle of the face"),
         FibresSpec::Uniform(degrees) => FibreAngles::uniform(&mesh, degrees.map(f64::to_radians)),
         FibresSpec::Nodes(nodes) => {
-            FibreAngles { nodes: nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect() }
+            FibreAngles::at_nodes(nodes.iter().map(|degrees| degrees.map(f64::to_radians)).collect())
         }
         FibresSpec::Field(field) => match &file {
             Some((file, geometry)) => file.angles(field, geometry)?,

@@ -13,6 +13,7 @@
 //! readable.
 
 pub mod exf;
+pub mod fibres;
 pub mod frame;
 pub mod machine;
 pub mod manifest;

@@ -107,8 +107,7 @@ impl Default for FramesSpec {
 
 fn task(table: &mut Table) -> Option<Task> {
     let kinds = [("forward", Task::Forward), ("fit", Task::Fit)];
-    let later = [("fibres", "fits fibre angles to measured directions")];
-    table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &later))
+    table.required("kind", "kind = \"forward\"", |item| item.choice(&kinds, &[]))
 }
 
 /// More than this is a slip of the keyboard: no machine factorises it.
@@ -130,7 +129,7 @@ fn block(table: &mut Table) -> Option<BlockSpec> {
     Some(BlockSpec { origin_mm: origin_mm?, size_mm: size_mm?, elements })
 }
 
-fn mesh(table: &mut Table, references: &References) -> Option<MeshSpec> {
+pub(super) fn mesh(table: &mut Table, references: &References) -> Option<MeshSpec> {
     let example = "block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }";
     const KEYS: [&str; 4] = ["block", "blocks", "exf", "face"];
     let found: Vec<&str> = KEYS.into_iter().filter(|key| table.has(key)).collect();
@@ -262,7 +261,7 @@ fn mooney_rivlin(table: &mut Table) -> Option<LawSpec> {
     Some(LawSpec::MooneyRivlin { c1_kpa, c2_kpa })
 }
 
-fn muscle(table: &mut Table, references: &References, host: Option<&MeshSpec>) -> Option<MuscleSpec> {
+pub(super) fn muscle(table: &mut Table, references: &References, host: Option<&MeshSpec>) -> Option<MuscleSpec> {
     let name = table.required("name", "name = \"slab\"", |item| item.name());
     let example = "block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }";
     const KEYS: [&str; 3] = ["block", "exf", "face"];

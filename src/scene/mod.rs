@@ -13,6 +13,7 @@ mod cursor;
 mod curves;
 mod effects;
 mod face;
+mod fibres;
 mod interpret;
 mod lock;
 mod nearest;
@@ -25,6 +26,9 @@ mod units;
 
 pub use curves::Curves;
 pub use face::{FACE, built_in_face};
+pub use fibres::{
+    AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
+};
 pub use spec::*;
 pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};
 pub use units::Units;
@@ -148,6 +152,8 @@ pub enum Problem {
     Scene(Box<Scene>),
     /// To solve a problem in many ways.
     Study(Box<Study>),
+    /// To fit fibre angles to measured directions.
+    Fibres(Box<FibreProblem>),
 }
 
 impl Problem {
@@ -158,7 +164,7 @@ impl Problem {
     pub fn read(path: &Path, overrides: &[String]) -> Result<Problem> {
         let file = File::read(path)?;
         let mut root = Source::new(&file.name, &file.text).tree().map_err(Error::all)?;
-        if !study::is_study(&root) {
+        if !study::is_study(&root) && !fibres::is_fibres(&root) {
             return Scene::read(path, overrides).map(|scene| Problem::Scene(Box::new(scene)));
         }
         let mistakes = Mistakes::default();
@@ -168,6 +174,15 @@ impl Problem {
             }
         }
         let folder = absolute(file.folder)?;
+        if fibres::is_fibres(&root) {
+            unique_names(&root, "muscle", &mistakes);
+            let references = References::new(&root, &folder, true);
+            let fibres = fibres::fibres(&root, &default_name(&file.name, &folder), &references, &mistakes);
+            return match (fibres, mistakes.sorted(&file.name)) {
+                (Some(fibres), mistakes) if mistakes.is_empty() => Ok(Problem::Fibres(Box::new(fibres))),
+                (_, mistakes) => Err(Error::all(mistakes)),
+            };
+        }
         let study = study::study(&root, &default_name(&file.name, &folder), &folder, &mistakes);
         match (study, mistakes.sorted(&file.name)) {
             (Some(study), mistakes) if mistakes.is_empty() => Ok(Problem::Study(Box::new(study))),

@@ -109,7 +109,7 @@ fn embedded(reference: &Reference, host: &Mesh) -> Vec<Muscle> {
         .iter()
         .enumerate()
         .map(|(k, m)| {
-            let angles = FibreAngles { nodes: m.angles_rad.iter().map(|[a, b, c]| [*a, -b, *c]).collect() };
+            let angles = FibreAngles::at_nodes(m.angles_rad.iter().map(|[a, b, c]| [*a, -b, *c]).collect());
             Muscle::new(&format!("m{k}"), &locator, &muscle_mesh(m), &angles, m.gauss, FIBRE, k).expect("inside")
         })
         .collect()

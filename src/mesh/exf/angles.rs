@@ -4,12 +4,14 @@ use super::file::ExFile;
 use super::geometry::Geometry;
 use super::sums::{missing, unsupported};
 use crate::error::{Error, Place, Result};
-use crate::mesh::fibre_angles::FibreAngles;
+use crate::math::tensor::{Matrix, dot};
+use crate::mesh::fibre_angles::{FibreAngles, axes};
 use std::collections::BTreeMap;
 
 impl ExFile {
     /// The angles of the field `field` at the nodes of a mesh from this file. The components are the fibre angle, the
-    /// imbrication angle and the sheet angle, in this order; those that are not there are 0.
+    /// imbrication angle and the sheet angle, in this order; those that are not there are 0. A node may have several
+    /// versions that are the same axes: then elements keep their own.
     ///
     /// # Errors
     /// [`Error::ExField`] where there is no such field, [`Error::ExUnsupported`] where it is not one angle per node in
@@ -32,7 +34,8 @@ impl ExFile {
             return Err(Error::ExField { wanted: Some(field.into()), found: names.join(", ").into(), place });
         }
         let mut nodes: Vec<Option<[f64; 3]>> = vec![None; geometry.mesh.nodes];
-        for (identifier, corners) in geometry.elements.iter().zip(&geometry.mesh.corners) {
+        let mut own = BTreeMap::new();
+        for (index, (identifier, corners)) in geometry.elements.iter().zip(&geometry.mesh.corners).enumerate() {
             let Some(element) = by_identifier.get(identifier) else {
                 return Err(missing(format!("field `{field}` in element {identifier}"), &Place::whole(&self.file)));
             };
@@ -60,19 +63,30 @@ impl ExFile {
                     }
                 }
             }
-            for (node, angles) in corners.iter().zip(angles) {
-                if nodes[*node].is_some_and(|known| known != angles) {
+            for (node, here) in corners.iter().zip(&angles) {
+                let known = *nodes[*node].get_or_insert(*here);
+                if known == *here {
+                    continue;
+                }
+                if !same_axes(known, *here) {
                     let construct =
                         format!("different values of field `{field}` at one corner, node {}", geometry.nodes[*node]);
                     return Err(unsupported(
                         construct,
-                        "give fibre angles one version at every node",
+                        "give fibre angles one version at every node, or versions that are the same axes",
                         &element.element.place,
                     ));
                 }
-                nodes[*node] = Some(angles);
+                own.insert(index, angles);
             }
         }
-        Ok(FibreAngles { nodes: nodes.into_iter().map(Option::unwrap_or_default).collect() })
+        Ok(FibreAngles { nodes: nodes.into_iter().map(Option::unwrap_or_default).collect(), own })
     }
+}
+
+/// Whether two triples of angles are the same three axes, without a sign.
+fn same_axes(one: [f64; 3], other: [f64; 3]) -> bool {
+    const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let pairs = axes(&IDENTITY, one).into_iter().zip(axes(&IDENTITY, other));
+    pairs.into_iter().all(|(a, b)| dot(a, b).abs() > 1.0 - 1e-9)
 }

@@ -8,8 +8,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Everything in an EX file that can become a mesh with fields: nodes and three-dimensional elements. Faces, lines, data
-/// points and groups are passed over.
+/// Everything in an EX file that can become a mesh with fields: nodes and three-dimensional elements, and data points. Faces,
+/// lines and groups are passed over.
 #[derive(Debug, Clone)]
 pub struct ExFile {
     pub(super) file: Arc<str>,
@@ -22,6 +22,7 @@ pub struct ExFile {
 pub(super) struct Region {
     pub path: String,
     pub nodes: BTreeMap<i64, Node>,
+    pub points: BTreeMap<i64, Node>,
     pub elements: Vec<Element>,
 }
 
@@ -179,13 +180,9 @@ impl Reader<'_> {
         let Some(template) = &self.node_template else {
             return Err(self.lines.wrong("`#Fields=` before the first node"));
         };
-        let mut unused = Node::new();
-        let node = if self.data_points {
-            &mut unused
-        } else {
-            self.file.regions[self.region].nodes.entry(number).or_default()
-        };
-        template.read_node(&mut self.lines, node)
+        let region = &mut self.file.regions[self.region];
+        let nodes = if self.data_points { &mut region.points } else { &mut region.nodes };
+        template.read_node(&mut self.lines, nodes.entry(number).or_default())
     }
 
     /// `Element: 7`, or in version 1 `Element: 7 0 0` (faces and lines have their number in the other places).

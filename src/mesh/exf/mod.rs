@@ -11,6 +11,8 @@
 //! and z: it is the same shape wherever the field is a polynomial in x, y, z, and of curvilinear coordinates it is the
 //! Hermite with the same values and derivatives at the corners of every element.
 //!
+//! Nodes and data points with a vector are read as such by [`ExFile::vectors`].
+//!
 //! Refused with file, line and construct: other systems of coordinates, simplices, grids, hanging corners.
 //!
 //! Version 1 keeps nodes and elements in two files; one file that holds both, one after the other, is read here.
@@ -28,13 +30,16 @@ mod nodes;
 mod sums;
 mod system;
 mod theta;
+mod vectors;
 mod write;
+mod write_angles;
 
 pub use convert::Conversion;
 pub use coordinates::Coordinates;
 pub use file::ExFile;
 pub use geometry::Geometry;
 pub use write::{Points, write_mesh, write_points};
+pub use write_angles::write_angles;
 
 /// Labels of nodal parameters, indexed by the bit mask d1 + 2 d2 + 4 d3 of their derivative.
 const LABELS: [&str; 8] = ["value", "d/ds1", "d/ds2", "d2/ds1ds2", "d/ds3", "d2/ds1ds3", "d2/ds2ds3", "d3/ds1ds2ds3"];

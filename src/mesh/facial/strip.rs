@@ -129,9 +129,9 @@ impl Course {
             let from = |node: usize| index(node % along, n2 - node / along % across, node / along / across);
             let mirrored = (0..nodes.len()).map(|node| side.of_left(nodes[from(node)])).collect();
             let angles = (0..nodes.len()).map(|node| angles[from(node)].map(|angle| -angle)).collect();
-            return (Mesh::new(&Trilinear, mirrored, corners), FibreAngles { nodes: angles });
+            return (Mesh::new(&Trilinear, mirrored, corners), FibreAngles::at_nodes(angles));
         }
-        (Mesh::new(&Trilinear, nodes, corners), FibreAngles { nodes: angles })
+        (Mesh::new(&Trilinear, nodes, corners), FibreAngles::at_nodes(angles))
     }
 
     /// Stations at equal distances along the centre line.

@@ -27,6 +27,8 @@ pub struct Grid {
 pub enum CellKind {
     /// A single point.
     Vertex,
+    /// A straight line between two points.
+    Line,
     /// A hexahedron with straight edges.
     Hexahedron,
     /// A Bezier hexahedron of order 3, without weights.
@@ -38,6 +40,7 @@ impl CellKind {
     pub fn number(self) -> u8 {
         match self {
             CellKind::Vertex => 1,
+            CellKind::Line => 3,
             CellKind::Hexahedron => 12,
             CellKind::BezierHexahedron => 79,
         }
@@ -47,6 +50,7 @@ impl CellKind {
     pub fn points(self) -> usize {
         match self {
             CellKind::Vertex => 1,
+            CellKind::Line => 2,
             CellKind::Hexahedron => 8,
             CellKind::BezierHexahedron => 64,
         }
