@@ -504,14 +504,48 @@ fn a_face_is_read_expanded_and_locked() {
         Some("C005"),
         "half a face has no right side"
     );
-    assert_eq!(code(&HALF_FACE.replace("mandibular.L", "mandibular")), Some("C009"));
-    let origin = HALF_FACE.replace("ligament = \"mandibular.L\"", "origin = \"mentalis.R\"");
-    let at = built_in_face().origin("mentalis", BodySide::Right).unwrap();
-    assert_eq!(parse(&origin, &[]).unwrap().attachments[0].position_mm, at);
-    assert!(at[0] < 0.0);
-    assert_eq!(code(&origin.replace("mentalis.R", "orbicularis_oculi_orbital.L")), Some("C009"), "a ring has none");
+    assert_eq!(code(&HALF_FACE.replace("mandibular.L", "mandibula.L")), Some("C009"));
+    assert_eq!(
+        code(&HALF_FACE.replace("mandibular.L", "mandibular.R")),
+        Some("C005"),
+        "half a face has no right side"
+    );
+    let positions = |text: &str| -> Vec<[f64; 3]> {
+        parse(text, &[]).unwrap_or_else(|error| panic!("{error}")).attachments.iter().map(|a| a.position_mm).collect()
+    };
+    // a name without a side is both sides, of the half the left one; a list is all of them
+    let named = |names: &str| text.replace("ligament = \"mandibular.L\"", names);
+    let face = built_in_face();
+    let of = |side| face.origin("mentalis", side).unwrap();
+    assert_eq!(positions(&named("origin = \"mentalis.R\"")), of(BodySide::Right));
+    assert_eq!(positions(&named("origin = \"mentalis\"")), [of(BodySide::Left), of(BodySide::Right)].concat());
+    assert_eq!(
+        positions(&HALF_FACE.replace("ligament = \"mandibular.L\"", "origin = \"mentalis\"")),
+        of(BodySide::Left)
+    );
+    assert_eq!(positions(&named("ligament = [\"mandibular\", \"zygomatic.R\"]")).len(), 3);
+    assert_eq!(code(&named("origin = \"orbicularis_oris\"")), Some("C009"), "it has none");
     assert_eq!(code(&HALF_FACE.replace("ligament =", "position_mm = [0, 0, 0]\nligament =")), Some("C011"));
     assert_eq!(code(&HALF_FACE.replace("half = true", "whole = true")), Some("C002"));
+}
+
+#[test]
+fn what_holds_the_face_to_the_bone_is_inside() {
+    let face = built_in_face();
+    for options in [WHOLE, HALVED] {
+        let mesh = mesh(options);
+        let locator = Locator::new(&mesh);
+        for side in BodySide::ALL {
+            let origins = face
+                .muscles
+                .iter()
+                .flat_map(|m| face.origin(&m.name, side).unwrap().into_iter().map(|at| (&m.name, at)));
+            let ligaments = face.ligaments.iter().map(|l| (&l.name, face.ligament(&l.name, side).unwrap()));
+            for (name, at) in origins.chain(ligaments) {
+                assert!(locator.locate(at).is_ok(), "{name}: {at:?} is outside");
+            }
+        }
+    }
 }
 
 #[test]

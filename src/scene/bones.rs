@@ -1,7 +1,7 @@
 //! `[[bone]]`: rigid bodies that move, and what is tied to them.
 
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, Reader, Table};
-use super::face::{self, Named};
+use super::face::{self, Anchors};
 use super::interpret::direction;
 use super::references::help_for_name;
 use super::spec::{AttachmentSpec, BoneSpec, HingeSpec, MeshSpec, SlideSpec, TieSpec};
@@ -48,18 +48,17 @@ fn bounds(item: Item) -> Option<[f64; 2]> {
     }
 }
 
-pub(super) fn attachment(table: &mut Table, host: Option<&MeshSpec>) -> Option<AttachmentSpec> {
-    const KEYS: [&str; 3] = ["position_mm", "ligament", "origin"];
-    let found: Vec<&str> = KEYS.into_iter().filter(|key| table.has(key)).collect();
-    let position_mm = match found[..] {
-        ["ligament"] => table.item("ligament").and_then(|item| face::named_point(&item, Named::Ligament, host)),
-        ["origin"] => table.item("origin").and_then(|item| face::named_point(&item, Named::Origin, host)),
-        [_, _, ..] => {
-            KEYS.iter().for_each(|key| drop(table.item(key)));
-            table.not_exactly_one(&KEYS, &found)
-        }
-        _ => table.required("position_mm", "position_mm = [0, 10, 10]", |item| item.numbers(FINITE)),
-    };
+/// The attachments of a table: one, or one for each place that a ligament or the origin of a muscle has.
+pub(super) fn attachment(table: &mut Table, host: Option<&MeshSpec>) -> Option<Vec<AttachmentSpec>> {
+    let named = table.one_of(&[
+        ("position_mm", |item| Some((None, item))),
+        ("ligament", |item| Some((Some(Anchors::Ligament), item))),
+        ("origin", |item| Some((Some(Anchors::Origin), item))),
+    ]);
+    let positions_mm = named.and_then(|(kind, item)| match kind {
+        None => item.numbers(FINITE).map(|at| vec![at]),
+        Some(kind) => face::anchors(&item, host, kind),
+    });
     let spring: Reader<TieSpec> = |item| {
         let stiffness_mn_per_mm = item.number(NOT_NEGATIVE)?;
         Some(TieSpec::Spring { stiffness_mn_per_mm })
@@ -70,7 +69,9 @@ pub(super) fn attachment(table: &mut Table, host: Option<&MeshSpec>) -> Option<A
     };
     let tie = table.one_of(&[("stiffness_mn_per_mm", spring), ("rigid", rigid)]);
     let bone = carried(table);
-    Some(AttachmentSpec { position_mm: position_mm?, tie: tie?, bone: bone?, place: table.place() })
+    let (tie, bone, place) = (tie?, bone?, table.place());
+    let at = |position_mm| AttachmentSpec { position_mm, tie, bone: bone.clone(), place: place.clone() };
+    Some(positions_mm?.into_iter().map(at).collect())
 }
 
 /// The key `bone` of what a bone may carry; whether there is such a bone is asked once for all by [`known`].

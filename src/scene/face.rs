@@ -175,6 +175,7 @@ fn course(table: &mut Table) -> Option<Course> {
     });
     let closed = table.or("closed", false, |item| item.flag());
     let focus = table.optional("focus_mm", |item| pair(&item));
+    let origin = table.or("origin_mm", Vec::new(), |item| item.list("a list of places [u, v]", |place| pair(&place)));
     table.optional("source", |item| item.name())?;
     let (elements, closed) = (elements?, closed?);
     if closed && elements[0] < 3 {
@@ -190,6 +191,7 @@ fn course(table: &mut Table) -> Option<Course> {
         elements,
         closed,
         focus: focus?,
+        origin: origin?,
     })
 }
 
@@ -219,17 +221,21 @@ fn anchor(table: &mut Table) -> Option<Anchor> {
 }
 
 /// Makes of every `[[muscle]]` that names muscles of the face one table for each of them and for each side, with their names.
+/// Without a side it is both, and the left one of a half face.
 pub(super) fn expand_muscles(root: &mut Node) {
+    let inner = |node: &Node, key: &str| Some(node.entries()?.iter().find(|entry| entry.key == key)?.node.clone());
+    let half = inner(root, "mesh").and_then(|mesh| inner(&inner(&mesh, "face")?, "half"));
+    let is_half = half.is_some_and(|half| matches!(half.value, Value::Flag(true)));
     let Value::Table(entries) = &mut root.value else { return };
     let Some(Entry { node: Node { value: Value::List(muscles), .. }, .. }) =
         entries.iter_mut().find(|entry| entry.key == "muscle")
     else {
         return;
     };
-    *muscles = muscles.drain(..).flat_map(expanded).collect();
+    *muscles = muscles.drain(..).flat_map(|muscle| expanded(muscle, is_half)).collect();
 }
 
-fn expanded(muscle: Node) -> Vec<Node> {
+fn expanded(muscle: Node, is_half: bool) -> Vec<Node> {
     let Value::Table(entries) = &muscle.value else { return vec![muscle] };
     let find = |key: &str| entries.iter().find(|entry| entry.key == key);
     let (Some(face), None) = (find("face"), find("name")) else { return vec![muscle] };
@@ -239,6 +245,7 @@ fn expanded(muscle: Node) -> Vec<Node> {
     };
     let side = find("side").map(|entry| &entry.node.value);
     let sides: Vec<&str> = match side {
+        None if is_half => vec!["L"],
         None => vec!["L", "R"],
         Some(Value::Text(side)) if side == "both" => vec!["L", "R"],
         Some(Value::Text(side)) => vec![side],
@@ -296,49 +303,52 @@ pub(super) fn muscle(table: &mut Table, host: Option<&MeshSpec>) -> Option<FaceM
     Some(FaceMuscleSpec { name, side, face })
 }
 
-/// What a point of the face can be named by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Named {
+/// What of a face an attachment may name.
+pub(super) enum Anchors {
+    /// `ligament = "zygomatic"`.
     Ligament,
+    /// `origin = "zygomaticus_major"`: where a muscle is fixed to bone.
     Origin,
 }
 
-/// Where `ligament = "zygomatic.L"` or `origin = "zygomaticus_major.L"` of an attachment is, mm.
-pub(super) fn named_point(item: &Item, kind: Named, host: Option<&MeshSpec>) -> Option<[f64; 3]> {
-    let written = item.name()?;
-    let face = match host.map(|host| &host.geometry) {
-        None => built_in_face(),
-        Some(GeometrySpec::Face(spec)) => Arc::clone(&spec.face),
-        Some(_) => {
-            let allowed = "left out: the mesh is no face; write position_mm";
-            return item.out_of_range(&format!("{written:?}"), allowed);
+/// Where the ligaments or origins are that an attachment names, mm: one name or a list, each with its side, as
+/// `"zygomatic.L"`, or without for both (of the left half, the left).
+pub(super) fn anchors(item: &Item, host: Option<&MeshSpec>, kind: Anchors) -> Option<Vec<[f64; 3]>> {
+    let (face, half) = match host.map(|host| &host.geometry) {
+        None => (built_in_face(), false),
+        Some(GeometrySpec::Face(spec)) => (Arc::clone(&spec.face), spec.half),
+        Some(_) => return item.out_of_range("a part of a face", "left out: the mesh is no face; write position_mm"),
+    };
+    let of_name = |item: &Item| -> Option<Vec<[f64; 3]>> {
+        let written = item.name()?;
+        let suffix = |side: &BodySide| written.strip_suffix(side.letter()).and_then(|name| name.strip_suffix('.'));
+        let named = BodySide::ALL.into_iter().find_map(|side| Some((suffix(&side)?, vec![side])));
+        let (name, sides) = named.unwrap_or_else(|| (&written, BodySide::ALL.to_vec()));
+        let sides: Vec<BodySide> = sides.into_iter().filter(|side| !half || *side == BodySide::Left).collect();
+        if sides.is_empty() {
+            return item.out_of_range(&format!("{written:?}"), "on the left: the mesh is the left half of the face");
         }
+        let on = |side: BodySide| match kind {
+            Anchors::Ligament => face.ligament(name, side).map(|at| vec![at]),
+            Anchors::Origin => face.origin(name, side).filter(|all| !all.is_empty()),
+        };
+        if let Some(found) = sides.iter().map(|side| on(*side)).collect::<Option<Vec<_>>>() {
+            return Some(found.concat());
+        }
+        let (what, known): (_, Vec<&String>) = match kind {
+            Anchors::Ligament => ("ligament of the face", face.ligaments.iter().map(|a| &a.name).collect()),
+            Anchors::Origin => (
+                "muscle of the face with an origin at bone",
+                face.muscles.iter().filter(|m| !m.origin.is_empty()).map(|m| &m.name).collect(),
+            ),
+        };
+        let known: Vec<String> = known.into_iter().cloned().collect();
+        unknown(item, what, written, &known, "known are")
     };
-    let find = |name: &str, side| match kind {
-        Named::Ligament => face.ligament(name, side),
-        Named::Origin => face.origin(name, side),
-    };
-    let found = BodySide::ALL
-        .into_iter()
-        .find_map(|side| find(written.strip_suffix(side.letter())?.strip_suffix('.')?, side));
-    if found.is_some() {
-        return found;
+    match &item.node.value {
+        Value::List(_) => Some(item.list("a name or a list of names", |name| of_name(&name))?.concat()),
+        _ => of_name(item),
     }
-    let (names, what, all): (Vec<&String>, _, _) = match kind {
-        Named::Ligament => {
-            (face.ligaments.iter().map(|l| &l.name).collect(), "ligament of the face", "ligaments of the face")
-        }
-        Named::Origin => {
-            let with_origin = face.muscles.iter().filter(|course| course.has_origin());
-            (
-                with_origin.map(|m| &m.name).collect(),
-                "origin of a muscle of the face",
-                "origins of muscles of the face",
-            )
-        }
-    };
-    let known: Vec<String> = names.iter().flat_map(|n| ["L", "R"].map(|side| format!("{n}.{side}"))).collect();
-    unknown(item, what, written, &known, all)
 }
 
 fn unknown<T>(item: &Item, kind: &'static str, name: String, known: &[String], kinds: &str) -> Option<T> {

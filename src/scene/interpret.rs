@@ -68,7 +68,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
             slidings: slidings?,
             contacts: contacts?,
             loads: loads?,
-            attachments: attachments?,
+            attachments: attachments?.concat(),
             controls: controls?,
             probes: probes?,
             fit: fit?,

@@ -45,7 +45,7 @@ pub struct Facial {
 }
 
 /// Anchors lie this part of the thickness above the deep surface, so that the elements hold them.
-const ANCHOR_DEPTH: f64 = 0.01;
+const ANCHOR_DEPTH: f64 = 0.05;
 
 impl Facial {
     /// The muscle of this name.
@@ -59,11 +59,9 @@ impl Facial {
         Some(self.anchor(anchor.u, anchor.v, side))
     }
 
-    /// Where the middle of the origin of a muscle meets the deep surface on a side, mm; `None` for a ring and for a half ring
-    /// that begins on the midline, which have none.
-    pub fn origin(&self, name: &str, side: BodySide) -> Option<Vector> {
-        let course = self.muscle(name)?;
-        course.has_origin().then(|| self.anchor(course.path[0][0], course.path[0][1], side))
+    /// Where the muscle of this name is fixed to bone on a side, mm; empty for one that is not.
+    pub fn origin(&self, name: &str, side: BodySide) -> Option<Vec<Vector>> {
+        Some(self.muscle(name)?.origin.iter().map(|[u, v]| self.anchor(*u, *v, side)).collect())
     }
 
     fn anchor(&self, u: f64, v: f64, side: BodySide) -> Vector {

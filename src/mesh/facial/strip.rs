@@ -33,6 +33,8 @@ pub struct Course {
     pub closed: bool,
     /// Where its fibres converge, (u, v); without it they run along the strip.
     pub focus: Option<[f64; 2]>,
+    /// Where on the deep surface it is fixed to bone, (u, v); may be empty.
+    pub origin: Vec<[f64; 2]>,
 }
 
 /// Which side of the face; the subject's own.
@@ -77,11 +79,6 @@ struct Station {
 }
 
 impl Course {
-    /// Whether it begins somewhere, and not in a ring or on the midline.
-    pub fn has_origin(&self) -> bool {
-        !self.closed && self.path[0][0] > 0.0
-    }
-
     /// The mesh of the muscle on a side and the angles of its fibres. xi1 runs along the line, xi3 outwards; nodes are
     /// numbered along, then across, then through the muscle.
     pub fn mesh(&self, sheet: &Sheet, side: BodySide) -> (Mesh, FibreAngles) {
