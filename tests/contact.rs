@@ -8,7 +8,7 @@ use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
 use risorius::mesh::surface::Surface;
-use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty, Smooth};
 use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Gap, Patches, Plane, RigidSurface, Sphere};
 
 /// A wavy sheet: the top of a block with all its parameters moved.
@@ -146,6 +146,7 @@ fn laws() -> Vec<(Box<dyn ContactLaw>, Vec<Allows>)> {
     vec![
         (Box::new(Penalty { stiffness: 40.0 }), both.clone()),
         (Box::new(Augmented { stiffness: 40.0, tolerance: 1e-6 }), both),
+        (Box::new(Smooth { stiffness: 40.0, range: 0.5 }), vec![Allows::ClosedOrOpen]),
         (Box::new(Barrier { stiffness: 40.0, range: 2.0 }), vec![Allows::ClosedOrOpen]),
     ]
 }

@@ -23,7 +23,7 @@ use crate::scene::{
 };
 use crate::term::Term;
 use crate::term::bone::Bone;
-use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
+use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty, Smooth};
 use crate::term::contact::mutual::{Between, Manner, Mutual};
 use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use crate::term::contact::{Contact, Interface};
@@ -382,6 +382,9 @@ fn contact(
 fn contact_law(law: &ContactLawSpec) -> Box<dyn ContactLaw> {
     match *law {
         ContactLawSpec::Penalty { kpa_per_mm } => Box::new(Penalty { stiffness: kpa_per_mm }),
+        ContactLawSpec::Smooth { kpa_per_mm, range_mm } => {
+            Box::new(Smooth { stiffness: kpa_per_mm, range: range_mm })
+        }
         ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
             Box::new(Augmented { stiffness: kpa_per_mm, tolerance: gap_mm })
         }

@@ -10,7 +10,11 @@ type Contacts = Option<Vec<ContactSpec>>;
 /// All slidings and all contacts of a file.
 pub(super) fn both(file: &mut Table) -> (Contacts, Contacts) {
     let slidings = numbered(file, "sliding", &[("penalty", penalty), ("augmented", augmented)]);
-    let contacts = numbered(file, "contact", &[("penalty", penalty), ("augmented", augmented), ("barrier", barrier)]);
+    let contacts = numbered(
+        file,
+        "contact",
+        &[("penalty", penalty), ("smooth", smooth), ("augmented", augmented), ("barrier", barrier)],
+    );
     (slidings, contacts)
 }
 
@@ -144,10 +148,19 @@ fn augmented(item: Item) -> Option<ContactLawSpec> {
     })
 }
 
+fn smooth(item: Item) -> Option<ContactLawSpec> {
+    let (kpa_per_mm, range_mm) = item.table(ranged)?;
+    Some(ContactLawSpec::Smooth { kpa_per_mm, range_mm })
+}
+
 fn barrier(item: Item) -> Option<ContactLawSpec> {
-    item.table(|table| {
-        let kpa_per_mm = stiffness(table);
-        let range_mm = table.required("range_mm", "range_mm = 0.1", |item| item.number(POSITIVE));
-        Some(ContactLawSpec::Barrier { kpa_per_mm: kpa_per_mm?, range_mm: range_mm? })
-    })
+    let (kpa_per_mm, range_mm) = item.table(ranged)?;
+    Some(ContactLawSpec::Barrier { kpa_per_mm, range_mm })
+}
+
+/// Stiffness and range of a law.
+fn ranged(table: &mut Table) -> Option<(f64, f64)> {
+    let kpa_per_mm = stiffness(table);
+    let range_mm = table.required("range_mm", "range_mm = 0.1", |item| item.number(POSITIVE));
+    Some((kpa_per_mm?, range_mm?))
 }

@@ -331,6 +331,9 @@ fn law_entry(law: &ContactLawSpec) -> String {
         ContactLawSpec::Augmented { kpa_per_mm, gap_mm } => {
             format!("augmented = {{ kpa_per_mm = {}, gap_mm = {} }}", number(*kpa_per_mm), number(*gap_mm))
         }
+        ContactLawSpec::Smooth { kpa_per_mm, range_mm } => {
+            format!("smooth = {{ kpa_per_mm = {}, range_mm = {} }}", number(*kpa_per_mm), number(*range_mm))
+        }
         ContactLawSpec::Barrier { kpa_per_mm, range_mm } => {
             format!("barrier = {{ kpa_per_mm = {}, range_mm = {} }}", number(*kpa_per_mm), number(*range_mm))
         }

@@ -487,6 +487,13 @@ pub enum ContactLawSpec {
         /// The gap that may remain, mm.
         gap_mm: f64,
     },
+    /// A spring per area that sets in over a range of depth; not for sliding.
+    Smooth {
+        /// Its stiffness beyond the range.
+        kpa_per_mm: f64,
+        /// The depth at which it has its full stiffness, mm.
+        range_mm: f64,
+    },
     /// A barrier that is never passed; not for sliding.
     Barrier {
         /// Its stiffness.

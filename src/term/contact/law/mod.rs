@@ -6,10 +6,12 @@
 mod augmented;
 mod barrier;
 mod penalty;
+mod smooth;
 
 pub use augmented::Augmented;
 pub use barrier::Barrier;
 pub use penalty::Penalty;
+pub use smooth::Smooth;
 
 /// Which gaps a law allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
