@@ -159,6 +159,12 @@ fn mistakes_of_a_study_are_told() {
         ("values = [[1, 1, 1], [2, 1, 1], [4, 1, 1]]", "values = []", "C007", "at least one value"),
         ("values = [[1, 1, 1], [2, 1, 1], [4, 1, 1]]", "", "C003", "values"),
         ("name = \"host\"", "labels = [\"coarse\"]", "C007", "3, one for each value"),
+        (
+            "name = \"host\"\nkey = \"mesh.block.elements\"\nvalues = [[1, 1, 1], [2, 1, 1], [4, 1, 1]]",
+            "without = \"contact.table\"\nlabels = [\"table\"]",
+            "C007",
+            "for the effect on and off",
+        ),
         ("key = \"mesh.block.elements\"", "without = \"contact.table\"", "C011", "key with values"),
         ("key = \"mesh.block.elements\"", "key = \"mesh.block.element\"", "C002", "did you mean `elements`"),
         (

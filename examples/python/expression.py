@@ -10,7 +10,7 @@ import pathlib
 
 import vtk
 
-from face import SKIN, VIEWS, actor, eyes
+from face import FOCUS, SKIN, VIEWS, actor, eyes, save
 
 
 def skin(path, at_rest, half):
@@ -70,19 +70,12 @@ def main():
             renderer.AddActor(eye)
         camera = renderer.GetActiveCamera()
         camera.SetPosition(*VIEWS[view])
-        camera.SetFocalPoint(0, 8, 75)
+        camera.SetFocalPoint(*FOCUS)
         camera.SetViewUp(0, 1, 0)
         camera.SetViewAngle(24)
         renderer.ResetCameraClippingRange()
         window.AddRenderer(renderer)
-    window.Render()
-    image = vtk.vtkWindowToImageFilter()
-    image.SetInput(window)
-    image.ReadFrontBufferOff()
-    writer = vtk.vtkPNGWriter()
-    writer.SetFileName(arguments.png)
-    writer.SetInputConnection(image.GetOutputPort())
-    writer.Write()
+    save(window, arguments.png)
 
 
 if __name__ == "__main__":

@@ -76,6 +76,17 @@ def fibres(path):
     return actor(tube, (1.0, 0.93, 0.85))
 
 
+def save(window, path):
+    window.Render()
+    image = vtk.vtkWindowToImageFilter()
+    image.SetInput(window)
+    image.ReadFrontBufferOff()
+    writer = vtk.vtkPNGWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputConnection(image.GetOutputPort())
+    writer.Write()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
@@ -122,14 +133,7 @@ def main():
             view.AddLight(light)
         view.ResetCameraClippingRange()
         window.AddRenderer(view)
-    window.Render()
-    image = vtk.vtkWindowToImageFilter()
-    image.SetInput(window)
-    image.ReadFrontBufferOff()
-    writer = vtk.vtkPNGWriter()
-    writer.SetFileName(str(args.picture))
-    writer.SetInputConnection(image.GetOutputPort())
-    writer.Write()
+    save(window, args.picture)
 
 
 if __name__ == "__main__":

@@ -317,7 +317,9 @@ pub(super) fn anchors(item: &Item, host: Option<&MeshSpec>, kind: Anchors) -> Op
     let (face, half) = match host.map(|host| &host.geometry) {
         None => (built_in_face(), false),
         Some(GeometrySpec::Face(spec)) => (Arc::clone(&spec.face), spec.half),
-        Some(_) => return item.out_of_range("a part of a face", "left out: the mesh is no face; write position_mm"),
+        Some(_) => {
+            return item.out_of_range(&item.node.to_toml(), "left out: the mesh is no face; write position_mm");
+        }
     };
     let of_name = |item: &Item| -> Option<Vec<[f64; 3]>> {
         let written = item.name()?;
@@ -335,15 +337,17 @@ pub(super) fn anchors(item: &Item, host: Option<&MeshSpec>, kind: Anchors) -> Op
         if let Some(found) = sides.iter().map(|side| on(*side)).collect::<Option<Vec<_>>>() {
             return Some(found.concat());
         }
-        let (what, known): (_, Vec<&String>) = match kind {
-            Anchors::Ligament => ("ligament of the face", face.ligaments.iter().map(|a| &a.name).collect()),
+        let ([what, kinds], known): (_, Vec<&String>) = match kind {
+            Anchors::Ligament => {
+                (["ligament of the face", "ligaments of the face"], face.ligaments.iter().map(|a| &a.name).collect())
+            }
             Anchors::Origin => (
-                "muscle of the face with an origin at bone",
+                ["muscle of the face with an origin at bone", "muscles of the face with an origin at bone"],
                 face.muscles.iter().filter(|m| !m.origin.is_empty()).map(|m| &m.name).collect(),
             ),
         };
         let known: Vec<String> = known.into_iter().cloned().collect();
-        unknown(item, what, written, &known, "known are")
+        unknown(item, what, written, &known, kinds)
     };
     match &item.node.value {
         Value::List(_) => Some(item.list("a name or a list of names", |name| of_name(&name))?.concat()),

@@ -242,16 +242,18 @@ fn factor(table: &mut Table) -> Option<Factor> {
         let values = item.list("a list of values", |value| Some(value.node.to_toml()))?;
         if values.is_empty() { item.wrong_length("no entry", "at least one value") } else { Some(values) }
     })?;
+    let without = table.optional("without", |item| item.name())?;
     let labels = table.optional("labels", |item| {
         let labels = item.list("a list of labels", |label| label.name())?;
-        match values.as_ref().map(Vec::len) {
-            Some(expected) if expected != labels.len() => {
-                item.wrong_length(&format!("{} labels", labels.len()), &format!("{expected}, one for each value"))
-            }
-            _ => Some(labels),
+        let (expected, what) = match &values {
+            Some(values) => (values.len(), "one for each value"),
+            None => (2, "for the effect on and off"),
+        };
+        match labels.len() {
+            found if found == expected => Some(labels),
+            found => item.wrong_length(&format!("{found} labels"), &format!("{expected}, {what}")),
         }
     })?;
-    let without = table.optional("without", |item| item.name())?;
     let level = |label: String, change: Change| Level { label, change };
     let (default, levels) = match (key, values, without) {
         (Some(key), Some(values), None) => {
@@ -263,7 +265,15 @@ fn factor(table: &mut Table) -> Option<Factor> {
         (None, None, Some(gone)) => {
             let off = Change { without: vec![gone.clone()], ..Change::default() };
             let default = gone.rsplit('.').next().unwrap_or_default().to_owned();
-            (default, vec![level("on".into(), Change::default()), level("off".into(), off)])
+            let labels = labels.unwrap_or_else(|| vec!["on".into(), "off".into()]);
+            (
+                default,
+                labels
+                    .into_iter()
+                    .zip([Change::default(), off])
+                    .map(|(label, change)| level(label, change))
+                    .collect(),
+            )
         }
         (Some(_), None, None) => {
             table.must_hold("values", "values = [0, 1, 10]");

@@ -8,26 +8,10 @@ use risorius::model::build::build;
 use risorius::scene::Scene;
 use std::path::Path;
 
-const SLAB: &str = r#"
-[task]
-kind = "forward"
-[mesh]
-block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
-[tissue]
-mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
-gauss = 4
-[[muscle]]
-name = "slab"
-block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
-fibre_angles_deg = [36, 0, 0]
-blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
-[[support]]
-clamp = { face = "xi1=0" }
-"#;
-
 #[test]
 fn a_factor_in_single_precision_changes_no_answer() {
-    let scene = Scene::parse(SLAB, "slab.toml", Path::new("."), &[]).expect("a scene");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/slab/problem.toml");
+    let scene = Scene::read(&path, &["muscle.slab.fibre_angles_deg=[36, 0, 0]".into()]).expect("a scene");
     let model = build(&scene).expect("a model").model;
     let to = Drive { controls: vec![0.1], load: 1.0 };
     let [double, single] = [Precision::Double, Precision::Single].map(|precision| {
