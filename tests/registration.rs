@@ -101,7 +101,7 @@ fn registered(
         }
     }
     let placed = place(&scene, spec, &mesh, &recording)?;
-    let (registration, warnings) = register(&scene, spec, &mesh, &placed, &mut recording)?;
+    let (registration, warnings) = register(&scene, spec, &mesh, &placed, &mut recording, None)?;
     Ok((registration, warnings, recording))
 }
 

@@ -10,12 +10,15 @@ use super::run::{Run, Tally};
 use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
+use crate::fit::head::{HeadFrame, HeadMotion};
 use crate::fit::placement::Marker;
 use crate::fit::registration::Registration;
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
-use crate::report::tables::{Placement, write_registration};
+use crate::markers::Recording;
+use crate::math::motion::Motion;
+use crate::report::tables::{HeadRow, Placement, write_head, write_registration};
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
 use crate::scene::{ControlRange, FitSpec, Scene};
@@ -36,6 +39,9 @@ pub(super) fn fit(
     let mut fit = Fit::new(model, scene, spec, recording)?;
     let names: Vec<String> = fit.markers().iter().map(|m| m.name.clone()).collect();
     write_registration(&run.folder, &placements(fit.markers(), registration))?;
+    if let Some(head) = &registration.head {
+        write_head(&run.folder, &heads(head, registration, recording))?;
+    }
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, true)?;
     let ranges = scene.control_ranges();
     let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
@@ -116,6 +122,21 @@ fn placements<'m>(markers: &'m [Marker], registration: &Registration) -> Vec<Pla
         counted: shown(m).is_some_and(|registered| !registered.off),
     };
     markers.iter().map(placement).collect()
+}
+
+/// The head in every frame of the recording.
+fn heads(head: &HeadMotion, registration: &Registration, recording: &Recording) -> Vec<HeadRow> {
+    let of = registration.centre;
+    let sizes = |motion: Motion| {
+        [motion.rotation_vector().map(f64::to_degrees), std::array::from_fn(|i| motion.place(of)[i] - of[i])]
+    };
+    let row = |(index, frame): (usize, &HeadFrame)| HeadRow {
+        frame: Frame { index, time_s: recording.frames[index].time_s },
+        motion: frame.motion.map(sizes),
+        rms_mm: frame.rms_mm,
+        markers: frame.markers,
+    };
+    head.frames.iter().enumerate().map(row).collect()
 }
 
 /// The name of a control, with its unit where it has one.

@@ -12,6 +12,7 @@ pub mod bounded_step;
 pub mod covariance;
 pub mod frame;
 pub mod gauss_newton;
+pub mod head;
 pub mod placement;
 pub mod recording;
 pub mod registration;

@@ -54,7 +54,8 @@ pub fn place(scene: &Scene, fit: &FitSpec, mesh: &Mesh, recording: &Recording) -
     if mistakes.is_empty() { Ok(markers) } else { Err(Error::all(mistakes)) }
 }
 
-fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
+/// The error of a label that the recording does not have.
+pub(super) fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
     const SHOWN: usize = 12;
     let mut list = labels.iter().take(SHOWN).map(|l| format!("`{l}`")).collect::<Vec<_>>().join(", ");
     if labels.len() > SHOWN {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::container::{Container, Message};
-use super::format;
+use super::format::{self, DecodeFault};
 use super::health::{Clock, Health, Timing, Warning, seconds};
 use super::recording::{Collector, Frame, Recording, Source};
 use super::topic::{Reader, readers};
@@ -52,12 +52,7 @@ pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Re
         let named = options.topic.as_ref().is_none_or(|topic| *topic == channel.topic);
         named && format::decoder(schema, &channel.encoding).is_ok()
     })?;
-    if !options.allow_truncated {
-        whole(path, &container, options)?;
-    }
-    if let Some(part) = container.unguarded.filter(|_| !options.allow_unchecked) {
-        return Err(Error::UncheckedRecording { path: path.into(), part });
-    }
+    admit(path, &container, options)?;
     let reader = choose(path, readers(&container), options)?;
     let recording = decode(path, &container, &reader, options)?;
     if recording.health.labels.iter().all(|label| label.present == 0) {
@@ -71,6 +66,17 @@ pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Re
         });
     }
     Ok(recording)
+}
+
+/// An error for a file that is cut short or unchecked, unless that was allowed.
+pub(super) fn admit(path: &Path, container: &Container, options: &ReadOptions) -> Result<()> {
+    if !options.allow_truncated {
+        whole(path, container, options)?;
+    }
+    match container.unguarded.filter(|_| !options.allow_unchecked) {
+        Some(part) => Err(Error::UncheckedRecording { path: path.into(), part }),
+        None => Ok(()),
+    }
 }
 
 /// The bytes of a file.
@@ -110,9 +116,7 @@ fn choose(path: &Path, mut readers: BTreeMap<String, Reader>, options: &ReadOpti
         }
     };
     let Some(reader) = readers.remove(&name) else {
-        let closeness = |topic: &&Topic| strsim::jaro_winkler(&topic.name, &name);
-        let nearest = all.iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b)));
-        let nearest = nearest.filter(|topic| closeness(topic) > 0.7).map(|topic| topic.name.clone());
+        let nearest = nearest_topic(&all, &name);
         return Err(Error::TopicNotFound { path: path.into(), topic: name, nearest, topics: all });
     };
     if let Some(reason) = reader.fault {
@@ -122,6 +126,25 @@ fn choose(path: &Path, mut readers: BTreeMap<String, Reader>, options: &ReadOpti
         return Err(Error::EmptyTopic { path: path.into(), topic: name });
     }
     Ok(reader)
+}
+
+/// The topic with the most similar name, if one is similar.
+pub(super) fn nearest_topic(topics: &[Topic], name: &str) -> Option<String> {
+    let closeness = |topic: &&Topic| strsim::jaro_winkler(&topic.name, name);
+    let nearest = topics.iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b)));
+    nearest.filter(|topic| closeness(topic) > 0.7).map(|topic| topic.name.clone())
+}
+
+/// A message that does not hold what its schema promises.
+pub(super) fn undecodable(path: &Path, topic: &str, message: &Message, found: DecodeFault) -> Error {
+    let (path, topic, sequence) = (path.into(), topic.to_owned(), message.sequence);
+    match found.fault {
+        Fault::Encapsulation { id } => Error::UnsupportedEncapsulation { path, topic, sequence, id },
+        fault => {
+            let log_time_ns = message.log_time;
+            Error::Undecodable { path, topic, sequence, log_time_ns, byte: found.byte, fault }
+        }
+    }
 }
 
 /// Decodes all messages of a topic.
@@ -138,20 +161,9 @@ pub(super) fn decode(
         let Some(decoder) = reader.decoders.get(&message.channel) else {
             continue;
         };
-        let observation = decoder.decode(&message.payload).map_err(|found| {
-            let (path, topic, sequence) = (path.into(), reader.topic.name.clone(), message.sequence);
-            match found.fault {
-                Fault::Encapsulation { id } => Error::UnsupportedEncapsulation { path, topic, sequence, id },
-                fault => Error::Undecodable {
-                    path,
-                    topic,
-                    sequence,
-                    log_time_ns: message.log_time,
-                    byte: found.byte,
-                    fault,
-                },
-            }
-        })?;
+        let observation = decoder
+            .decode(&message.payload)
+            .map_err(|found| undecodable(path, &reader.topic.name, message, found))?;
         messages.push((message, observation.stamp_ns));
         collector.add(observation);
     }
