@@ -11,6 +11,7 @@
 
 mod container;
 mod fields;
+mod files;
 mod format;
 mod health;
 mod inspect;

@@ -161,7 +161,7 @@ impl PoseDecoder {
         let placed = tree.placed(position, orientation).map_err(whole)?;
         let time = |time: u64| i64::try_from(time).unwrap_or(i64::MAX);
         let stamp = match clock {
-            Clock::Header => tree.stamp(stamp).map_err(whole)?.ok_or(whole(Fault::Shape))?,
+            Clock::Header | Clock::File => tree.stamp(stamp).map_err(whole)?.ok_or(whole(Fault::Shape))?,
             Clock::Publish => time(message.publish_time),
             Clock::Log => time(message.log_time),
         };

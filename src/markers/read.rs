@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::container::{Container, Message};
-use super::format::{self, DecodeFault};
+use super::files::{self, FileFormat};
+use super::format::{self, DecodeFault, Observation};
 use super::health::{Clock, Health, Timing, Warning, seconds};
 use super::recording::{Collector, Frame, Recording, Source};
 use super::topic::{Reader, readers};
@@ -39,33 +40,41 @@ impl Default for ReadOptions {
     }
 }
 
-/// Reads the markers of one topic of an MCAP file.
+/// Reads the markers of one topic of an MCAP file, or of a C3D, TRC or CSV file.
 ///
-/// Errors: M001 to M012 and O001, each with its numbers; see [`crate::Error`].
+/// Errors: M001 to M012, M015 and O001, each with its numbers; see [`crate::Error`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     read_bytes(path, &load(path)?, options)
 }
 
-/// [`read`] for a file that is already in memory; `path` names it in messages.
+/// [`read`] for a file that is already in memory; `path` names it in messages, and tells C3D, TRC and CSV by its end.
 pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    if let Some(format) = files::kind(path) {
+        let recording = read_file(format, path, bytes, options)?;
+        return with_samples(recording);
+    }
     let container = Container::read(path, bytes, &|channel, schema| {
         let named = options.topic.as_ref().is_none_or(|topic| *topic == channel.topic);
         named && format::decoder(schema, &channel.encoding).is_ok()
     })?;
     admit(path, &container, options)?;
     let reader = choose(path, readers(&container), options)?;
-    let recording = decode(path, &container, &reader, options)?;
-    if recording.health.labels.iter().all(|label| label.present == 0) {
-        let missing = recording.health.labels.iter().map(|label| label.missing);
-        return Err(Error::NoSamples {
-            path: path.into(),
-            topic: reader.topic.name,
-            frames: recording.frames.len(),
-            labels: recording.labels.len(),
-            missing: missing.fold(Missing::default(), Missing::plus),
-        });
+    with_samples(decode(path, &container, &reader, options)?)
+}
+
+/// A recording that shows something.
+fn with_samples(recording: Recording) -> Result<Recording> {
+    if recording.health.labels.iter().any(|label| label.present > 0) {
+        return Ok(recording);
     }
-    Ok(recording)
+    let missing = recording.health.labels.iter().map(|label| label.missing);
+    Err(Error::NoSamples {
+        path: recording.source.path,
+        topic: recording.source.topic,
+        frames: recording.frames.len(),
+        labels: recording.labels.len(),
+        missing: missing.fold(Missing::default(), Missing::plus),
+    })
 }
 
 /// An error for a file that is cut short or unchecked, unless that was allowed.
@@ -169,10 +178,6 @@ pub(super) fn decode(
     }
     let (clock, stamps) = clock(&messages);
     let stamped = messages.iter().filter(|(_, stamp)| stamp.is_some()).count();
-    let (unlabelled_samples, units_declared) = (collector.unlabelled, collector.units.clone());
-    let ((labels, positions, label_health), zeros_kept) =
-        collector.finish(options.units.mm(), options.zero_is_missing);
-
     let mut warnings = Vec::new();
     warnings.extend(container.truncated.map(|cut| Warning::Truncated { offset: cut.offset, bytes: cut.bytes }));
     warnings.extend(container.unguarded.map(|part| Warning::Unchecked { part }));
@@ -182,9 +187,65 @@ pub(super) fn decode(
     if clock != Clock::Header {
         warnings.push(Warning::ClockFallback { stamped, messages: messages.len(), used: clock });
     }
+    let source = Source {
+        path: path.into(),
+        topic: reader.topic.name.clone(),
+        schema: reader.topic.schema.clone(),
+        schema_encoding: reader.topic.schema_encoding.clone(),
+        message_encoding: reader.topic.message_encoding.clone(),
+        format: reader.topic.markers.clone().unwrap_or_default(),
+        compression: container.compression.clone(),
+        units_declared: collector.units.clone(),
+        units: options.units,
+        clock,
+    };
+    Ok(recording(source, collector, stamps, warnings, options))
+}
+
+/// Reads a file that holds markers and nothing else.
+pub(super) fn read_file(format: &dyn FileFormat, path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    if let Some(topic) = &options.topic {
+        let (path, topic) = (path.into(), topic.clone());
+        return Err(Error::TopicNotFound { path, topic, nearest: None, topics: Vec::new() });
+    }
+    let tracks = files::read(format, path, bytes, options.allow_truncated)?;
+    let mut collector = Collector::default();
+    collector.units = tracks.units;
+    for samples in tracks.frames {
+        collector.add(Observation { stamp_ns: None, unit: None, samples });
+    }
+    let source = Source {
+        path: path.into(),
+        topic: String::new(),
+        schema: String::new(),
+        schema_encoding: String::new(),
+        message_encoding: String::new(),
+        format: format.name().into(),
+        compression: BTreeMap::new(),
+        units_declared: collector.units.clone(),
+        units: options.units,
+        clock: Clock::File,
+    };
+    let length = bytes.len() as u64;
+    let warnings = tracks.truncated.then_some(Warning::Truncated { offset: length, bytes: length });
+    Ok(recording(source, collector, tracks.stamps_ns, warnings.into_iter().collect(), options))
+}
+
+/// A recording of what was collected, with its health.
+fn recording(
+    source: Source,
+    collector: Collector,
+    stamps: Vec<i64>,
+    mut warnings: Vec<Warning>,
+    options: &ReadOptions,
+) -> Recording {
+    let unlabelled_samples = collector.unlabelled;
+    let ((labels, positions, label_health), zeros_kept) =
+        collector.finish(options.units.mm(), options.zero_is_missing);
     let disagrees = |declared: &&String| Units::from_name(declared) != Some(options.units);
     warnings.extend(
-        units_declared
+        source
+            .units_declared
             .iter()
             .filter(disagrees)
             .map(|declared| Warning::UnitsDisagree { declared: declared.clone(), used: options.units }),
@@ -209,19 +270,7 @@ pub(super) fn decode(
         labels: label_health,
         warnings,
     };
-    let source = Source {
-        path: path.into(),
-        topic: reader.topic.name.clone(),
-        schema: reader.topic.schema.clone(),
-        schema_encoding: reader.topic.schema_encoding.clone(),
-        message_encoding: reader.topic.message_encoding.clone(),
-        format: reader.topic.markers.clone().unwrap_or_default(),
-        compression: container.compression.clone(),
-        units_declared,
-        units: options.units,
-        clock,
-    };
-    Ok(Recording { source, labels, frames, health })
+    Recording { source, labels, frames, health }
 }
 
 /// One clock for the whole recording: the stamp in the message if every message has one, else publish time, else log

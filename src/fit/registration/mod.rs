@@ -5,9 +5,11 @@
 //! mended that was not asked for.
 
 mod diagnosis;
+mod matching;
 mod mirror;
 mod scale;
 
+pub use matching::{Proposal, propose};
 pub use mirror::{nearest, pairings};
 pub use scale::{Scale, scale};
 
