@@ -3,7 +3,6 @@
 //! The twin is that of `tests/twin.rs` (reference/beam_twin.json, an independent implementation).
 
 #[path = "recordings/others.rs"]
-#[allow(dead_code)] // shared with the tests of formats
 mod others;
 #[path = "recordings/writer.rs"]
 mod writer;

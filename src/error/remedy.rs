@@ -37,7 +37,7 @@ impl Error {
                 "rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into(),
             ),
             Error::NoMarkerTopic { .. } => Some(
-                "record mocap4r2 Markers, a MarkerArray, a PoseArray, a foxglove PointCloud or SceneUpdate, or JSON whose schema has \
+                "record `mocap4r2_msgs/msg/Markers`, a MarkerArray, a PoseArray, a foxglove PointCloud or SceneUpdate, or JSON whose schema has \
                  `markers[]`"
                     .into(),
             ),

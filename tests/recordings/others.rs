@@ -1,4 +1,5 @@
 //! Writes messages of other programs: poses, marker and pose arrays in CDR, point clouds and scene updates in JSON and protobuf.
+#![allow(dead_code)] // each test uses a part
 
 use super::writer::{Cdr, Message, Topic};
 use prost_reflect::prost::Message as _;
