@@ -61,23 +61,34 @@ fn main() -> std::io::Result<()> {
         ("eight.mcap", placed(|_, _, position| position)),
         ("left_handed.mcap", placed(|_, _, [x, y, z]| [x, -y, z])),
         ("turned.mcap", placed(|_, _, [x, y, z]| [0.03 - y, x, z + 0.01])),
-        ("moving_at_first.mcap", placed(|frame, label, [x, y, z]| {
-            if frame == 0 && label.starts_with("lip") { [x + 0.002, y, z + 0.002] } else { [x, y, z] }
-        })),
-        ("sides_exchanged.mcap", called(|label| match label {
-            "brow.L" => "brow.R",
-            "brow.R" => "brow.L",
-            "cheek.L" => "cheek.R",
-            "cheek.R" => "cheek.L",
-            "lip.L" => "lip.R",
-            "lip.R" => "lip.L",
-            middle => middle,
-        })),
-        ("two_labels_exchanged.mcap", called(|label| match label {
-            "nose" => "lip.L",
-            "lip.L" => "nose",
-            other => other,
-        })),
+        (
+            "moving_at_first.mcap",
+            placed(
+                |frame, label, [x, y, z]| {
+                    if frame == 0 && label.starts_with("lip") { [x + 0.002, y, z + 0.002] } else { [x, y, z] }
+                },
+            ),
+        ),
+        (
+            "sides_exchanged.mcap",
+            called(|label| match label {
+                "brow.L" => "brow.R",
+                "brow.R" => "brow.L",
+                "cheek.L" => "cheek.R",
+                "cheek.R" => "cheek.L",
+                "lip.L" => "lip.R",
+                "lip.R" => "lip.L",
+                middle => middle,
+            }),
+        ),
+        (
+            "two_labels_exchanged.mcap",
+            called(|label| match label {
+                "nose" => "lip.L",
+                "lip.L" => "nose",
+                other => other,
+            }),
+        ),
     ];
     for (name, bytes) in files.into_iter().chain(registered) {
         std::fs::write(folder.join(name), bytes)?;

@@ -10,7 +10,9 @@ mod writer;
 use assert_cmd::Command;
 use files::{Processor, Tracks};
 use others::Shown;
-use risorius::markers::{Clock, Fault, Missing, ReadOptions, Recording, Units, Warning, inspect_bytes, read, read_bytes};
+use risorius::markers::{
+    Clock, Fault, Missing, ReadOptions, Recording, Units, Warning, inspect_bytes, read, read_bytes,
+};
 use risorius::{Error, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -161,7 +163,10 @@ fn messages_that_do_not_hold_what_their_schema_says_are_refused() {
                 Ok(part) => {
                     assert_eq!(good.encoding, "protobuf", "{format}: {cut} bytes");
                     for p in part.frames[0].positions_mm.iter().flatten() {
-                        assert!((0..MARKERS).any(|marker| position(0, marker) == *p), "{format}: {p:?} of {cut} bytes");
+                        assert!(
+                            (0..MARKERS).any(|marker| position(0, marker) == *p),
+                            "{format}: {p:?} of {cut} bytes"
+                        );
                     }
                 }
                 Err(error) => {
@@ -206,7 +211,11 @@ fn a_flipped_bit_never_gives_a_wrong_value() {
 
 fn tracks(count: usize) -> Tracks {
     let frame = |frame| positions(frame).into_iter().map(Some).collect();
-    Tracks { labels: (0..MARKERS).map(|k| format!("M{k}")).collect(), rate: 100.0, frames: (0..count).map(frame).collect() }
+    Tracks {
+        labels: (0..MARKERS).map(|k| format!("M{k}")).collect(),
+        rate: 100.0,
+        frames: (0..count).map(frame).collect(),
+    }
 }
 
 /// The name, the bytes, and how far off a position may be, of every kind of file.

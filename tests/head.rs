@@ -2,6 +2,7 @@
 //!
 //! The twin is that of `tests/twin.rs` (reference/beam_twin.json, an independent implementation).
 
+mod common;
 #[path = "recordings/others.rs"]
 mod others;
 #[path = "recordings/writer.rs"]
@@ -135,8 +136,7 @@ fn fitted(topics: &[Topic], fit: &str, chosen: &[usize]) -> Result<Fitted, Error
     let mut clip = recording::read(spec)?;
     let poses = recording::poses(spec, &clip, None)?;
     let placed = placement::place(&scene, spec, built.model.mesh(), &clip)?;
-    let (registration, warnings) =
-        register(&scene, spec, built.model.mesh(), &placed, &mut clip, poses.as_ref())?;
+    let (registration, warnings) = register(&scene, spec, built.model.mesh(), &placed, &mut clip, poses.as_ref())?;
     let mut fit = Fit::new(&built.model, &scene, spec, &clip)?;
     let estimates = chosen.iter().map(|k| fit.frame(&clip, *k)).collect::<Result<_, _>>()?;
     Ok((registration, warnings, estimates))
@@ -188,8 +188,13 @@ fn a_slipping_bone_marker_is_named_and_does_no_harm() {
     let (registration, warnings, estimates) = fitted(&[topic], BONES, &CHOSEN[..2]).unwrap();
     assert_eq!(warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["K014"]);
     let frames = twin().truth.len();
-    let told = format!("`H4` moves against the others: it is off in {} of {frames} frames, first in frame 5", frames - 5);
-    assert!(warnings[0].message.contains(&told) && warnings[0].message.contains("2.92 mm"), "{}", warnings[0].message);
+    let told =
+        format!("`H4` moves against the others: it is off in {} of {frames} frames, first in frame 5", frames - 5);
+    assert!(
+        warnings[0].message.contains(&told) && warnings[0].message.contains("2.92 mm"),
+        "{}",
+        warnings[0].message
+    );
     assert_truth(&estimates, 1e-6);
     assert_eq!(registration.head.unwrap().frames[15].markers, 4);
 }
@@ -256,7 +261,8 @@ fn a_topic_of_poses_takes_the_head_out() {
 #[test]
 fn poses_are_interpolated_between_neighbours_only() {
     let axis = normalised([1.0, 2.0, -2.0]);
-    let at = |part: f64| Motion { scale: 1.0, turn: rotation(axis, 0.4 * part), shift: [10.0 * part, 0.0, -4.0 * part] };
+    let at =
+        |part: f64| Motion { scale: 1.0, turn: rotation(axis, 0.4 * part), shift: [10.0 * part, 0.0, -4.0 * part] };
     let poses: Vec<_> = (0..6)
         .map(|k| {
             let pose = at(k as f64);
@@ -294,7 +300,9 @@ fn a_run_tells_how_the_head_moved() {
     let output = command.current_dir(&folder).args(["run", "head.toml", "--out", "run"]).output().unwrap();
     let page = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    for words in ["head: taken out from 5 bone markers; it turns by up to 15.00 degrees (frame 15)", "registration: rigid"] {
+    for words in
+        ["head: taken out from 5 bone markers; it turns by up to 15.00 degrees (frame 15)", "registration: rigid"]
+    {
         assert!(page.contains(words), "{words} is not in\n{page}");
     }
     let table = |name: &str| std::fs::read_to_string(folder.path().join("run/tables").join(name)).unwrap();
@@ -308,4 +316,101 @@ fn a_run_tells_how_the_head_moved() {
     let registration = table("registration.csv");
     assert_eq!(registration.lines().next(), Some("name,skin_distance_mm,neutral_distance_mm,counted"));
     assert_eq!(registration.lines().count(), 13);
+}
+
+const FREE: &str = "[fit.head]\nestimate = true";
+
+/// Without bone markers the skin markers alone tell the head from the muscles: 15 degrees and 20 mm come back with the
+/// activations.
+#[test]
+fn a_head_is_estimated_together_with_the_activations() {
+    let topic = markers(&Motion::REST, |_| [0.0; 3], |_, label| label.starts_with('H'));
+    let (_, warnings, estimates) = fitted(&[topic], FREE, &CHOSEN).unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_truth(&estimates, 1e-5);
+    for estimate in &estimates {
+        let (found, truth) = (estimate.head.as_ref().unwrap().motion, head(estimate.frame));
+        assert!(found.then(&truth.inverse()).angle() < 1e-5, "{found:?} instead of {truth:?}");
+        assert!(norm(subtract(found.shift, truth.shift)) < 1e-3, "{found:?} instead of {truth:?}");
+        assert!(estimate.rms_mm < 1e-4, "frame {}: rms {} mm", estimate.frame, estimate.rms_mm);
+    }
+    // two markers do not say where the head is
+    let topic = markers(&Motion::REST, |_| [0.0; 3], |frame, label| frame == 8 && !["B01", "B07"].contains(&label));
+    let error = fitted(&[topic], FREE, &[8]).unwrap_err();
+    assert!(error.code() == "F020" && error.to_string().contains("shows 2 markers"), "{error}");
+}
+
+/// With noise of known size the standardised errors of activations and head have unit variance: their deviations hold what one
+/// takes from the other. Forty noisy copies of a frame, two activations, three angles and three shifts.
+#[test]
+fn deviations_hold_the_confounding_of_head_and_activations() {
+    let (frame, copies, noise) = (15, 40, 0.1);
+    let twin = twin();
+    let mut random = common::Random::new(5);
+    // uniform in +-1 has the standard deviation 1 / sqrt 3
+    let mut jitter = |x: f64| x + noise * 3.0_f64.sqrt() * random.next();
+    let mut messages = Vec::new();
+    for copy in 0..=copies {
+        // copy 0 is the neutral frame
+        let motion = if copy == 0 { Motion::REST } else { head(frame) };
+        let at = |x: [f64; 3]| motion.place(x);
+        let positions = &twin.positions_mm[if copy == 0 { 0 } else { frame }];
+        let shown: Vec<Ros2Marker> = twin
+            .labels
+            .iter()
+            .zip(positions)
+            .map(|(label, x)| Ros2Marker::named(label, at(*x).map(&mut jitter)))
+            .collect();
+        let payload = ros2_message(false, false, stamp(copy), &shown);
+        messages.push(Message { log_time: stamp(copy) as u64, publish_time: stamp(copy) as u64, payload });
+    }
+    let all: Vec<usize> = (1..=copies).collect();
+    let fit = format!("sd_mm = {noise}\n{FREE}");
+    let (registration, _, estimates) = fitted(&[Topic::ros2(false, messages)], &fit, &all).unwrap();
+    let (mut of_controls, mut of_turns, mut inflation) = (0.0, 0.0, 0.0_f64);
+    for estimate in &estimates {
+        let free = estimate.head.as_ref().unwrap();
+        for (control, truth) in twin.truth[frame].iter().enumerate() {
+            let sd = estimate.sd[control].expect("determined");
+            of_controls += ((estimate.equilibrium.state.controls[control] - truth) / sd).powi(2);
+            inflation = inflation.max(free.inflation[control].unwrap());
+        }
+        // the error of the head in the axes of the model, seen from the model
+        let error = head(frame).then(&free.motion.inverse()).rotation_vector();
+        let sd = free.sd.unwrap();
+        of_turns += (0..3).map(|i| (error[i].to_degrees() / sd[i]).powi(2)).sum::<f64>();
+    }
+    let (of_controls, of_turns) = (of_controls / (2 * copies) as f64, of_turns / (3 * copies) as f64);
+    println!(
+        "mean squares {of_controls:.3} (activations), {of_turns:.3} (turns); inflation {inflation:.2}; {registration}"
+    );
+    // 3.5 standard deviations of a mean of 80 and of 120 squares
+    assert!((of_controls - 1.0).abs() < 0.55, "activations: {of_controls}");
+    assert!((of_turns - 1.0).abs() < 0.45, "turns: {of_turns}");
+    assert!(inflation > 1.05, "a head that is not known costs something: {inflation}");
+}
+
+#[test]
+fn a_run_tells_how_sure_an_estimated_head_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let topic = markers(&elsewhere(), |_| [0.0; 3], |_, _| false);
+    std::fs::write(folder.path().join("beam.mcap"), file(container("zstd"), &[topic])).unwrap();
+    let fit = format!("register = \"rigid\"\nframes = {{ first = 15, last = 15 }}\nsd_mm = 0.2\n{FREE}");
+    std::fs::write(folder.path().join("head.toml"), problem(&fit)).unwrap();
+    let mut command = assert_cmd::Command::cargo_bin("risorius").unwrap();
+    let output = command.current_dir(&folder).args(["run", "head.toml", "--out", "run"]).output().unwrap();
+    let page = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    for words in
+        ["head: estimated with the controls; it turns by up to 15.0", "times that with a known head", "  top: its sd"]
+    {
+        assert!(page.contains(words), "{words} is not in\n{page}");
+    }
+    let table = std::fs::read_to_string(folder.path().join("run/tables/head.csv")).unwrap();
+    assert!(
+        table.lines().next().unwrap().ends_with("correlation_top,inflation_top,correlation_bottom,inflation_bottom")
+    );
+    let row: Vec<f64> = table.lines().nth(1).unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    assert!(row.len() == 18 && row[8..14].iter().all(|sd| *sd > 0.0 && *sd < 5.0), "{row:?}");
+    assert!((norm([row[2], row[3], row[4]]) - 15.0).abs() < 0.01, "{row:?}");
 }

@@ -118,7 +118,15 @@ fn moved(markers: &[(String, [f64; 3])], motion: &Motion) -> Vec<(String, [f64; 
 
 /// Two labels on each other's markers.
 fn exchanged(markers: &[(String, [f64; 3])], a: &str, b: &str) -> Vec<(String, [f64; 3])> {
-    let other = |name: &str| if name == a { b.to_owned() } else if name == b { a.to_owned() } else { name.to_owned() };
+    let other = |name: &str| {
+        if name == a {
+            b.to_owned()
+        } else if name == b {
+            a.to_owned()
+        } else {
+            name.to_owned()
+        }
+    };
     markers.iter().map(|(name, p)| (other(name), *p)).collect()
 }
 

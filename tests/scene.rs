@@ -110,7 +110,10 @@ fn a_whole_file_means_what_it_says() {
     assert_eq!(scene.controls[0].value, ControlValue::Constant(0.05));
     assert_eq!((scene.controls[0].place.column, scene.controls[0].place.length), (1, 10));
     let fit = scene.fit.as_ref().unwrap();
-    assert_eq!((fit.units, fit.unknowns.as_slice(), fit.frames.last), (Some(Units::M), &["slab".to_string()][..], Some(9)));
+    assert_eq!(
+        (fit.units, fit.unknowns.as_slice(), fit.frames.last),
+        (Some(Units::M), &["slab".to_string()][..], Some(9))
+    );
     assert_eq!((fit.registration.register, fit.registration.neutral), (RegisterSpec::Rigid, Some(3)));
     assert_eq!(fit.registration.axes.map(|axis| axis.word()), ["-x", "z", "y"]);
     assert_eq!((scene.markers[0].name.as_str(), scene.markers[0].label.as_str()), ("M01", "marker 1"));
@@ -222,6 +225,13 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     expect("\"-x\", \"z\"", "\"-y\", \"z\"", "C005", "[\"-y\"", "each of x, y, z once");
     let bones = "neutral = 3\nhead = { bone_markers = [\"a\", \"b\", \"a\"] }";
     expect("neutral = 3", bones, "C007", "[\"a\", \"b\"", "at least 3, which do not lie on a line");
+    expect(
+        "neutral = 3",
+        "neutral = 3\nhead = { estimate = false }",
+        "C005",
+        "false",
+        "without the table the head does not move",
+    );
     expect("neutral = 3", "neutral = 3\nhead = {}", "C011", "{}", "add the one you mean");
     expect("neutral = 3", "neutral = -3", "C005", "-3", "a whole number from 0");
     expect("neutral = 3", "neutral = \"last\"", "C006", "\"last\"", "it can be \"first\"");
@@ -407,7 +417,8 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
     for default in ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""] {
         assert!(lock.contains(default), "{default} is not in\n{lock}");
     }
-    for head in ["{ bone_markers = [\"brow.L\", \"b\", \"c\"] }", "{ pose_topic = \"/head\" }"] {
+    for head in ["{ bone_markers = [\"brow.L\", \"b\", \"c\"] }", "{ pose_topic = \"/head\" }", "{ estimate = true }"]
+    {
         let scene = parse(WHOLE, &[&format!("fit.head={head}")]).unwrap();
         let lock = scene.lock();
         let again = Scene::parse(&lock, "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();

@@ -10,6 +10,7 @@ use super::run::{Run, Tally};
 use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
+use crate::fit::free_head::{FreeHead, page};
 use crate::fit::head::{HeadFrame, HeadMotion};
 use crate::fit::placement::Marker;
 use crate::fit::registration::Registration;
@@ -18,8 +19,9 @@ use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::markers::Recording;
 use crate::math::motion::Motion;
-use crate::report::tables::{HeadRow, Placement, write_head, write_registration};
+use crate::math::tensor::subtract;
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
+use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
 use crate::scene::{ControlRange, FitSpec, Scene};
 
@@ -51,6 +53,7 @@ pub(super) fn fit(
     let mut tally = Tally::default();
     let mut fitted = Vec::new();
     let mut errors = MarkerErrors::default();
+    let mut heads: Vec<(usize, FreeHead)> = Vec::new();
     for &index in frames {
         if run.is_interrupted() {
             tally.interrupted = true;
@@ -74,6 +77,7 @@ pub(super) fn fit(
                 tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
                 let warning = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
                 tally.warn(frame, warning.into_iter().collect(), &mut meter, flags);
+                heads.extend(estimate.head.clone().map(|head| (index, head)));
                 fitted.push(FittedFrame {
                     frame,
                     values: estimate.equilibrium.state.controls.clone(),
@@ -93,9 +97,13 @@ pub(super) fn fit(
     *work = fit.work();
     record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
     let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
+    let sought: Vec<&str> = fit.unknowns().iter().map(|k| labels[*k].as_str()).collect();
+    if !heads.is_empty() {
+        write_free_head(&run.folder, &sought, &free_heads(&heads, registration, recording))?;
+    }
     let summary = FitSummary {
         name: &scene.name,
-        recording: &registration.to_string(),
+        recording: &(page(&heads, registration.centre, &sought) + &registration.to_string()),
         controls: &controls,
         bones: !model.bones().is_empty(),
         frames: &fitted,
@@ -106,9 +114,9 @@ pub(super) fn fit(
         seconds: run.start.elapsed().as_secs_f64(),
         folder: &run.folder.path().display().to_string(),
     };
-    let page = summary.to_string();
-    run.folder.write("summary.txt", &page)?;
-    print(&page)?;
+    let text = summary.to_string();
+    run.folder.write("summary.txt", &text)?;
+    print(&text)?;
     Ok(tally)
 }
 
@@ -122,6 +130,18 @@ fn placements<'m>(markers: &'m [Marker], registration: &Registration) -> Vec<Pla
         counted: shown(m).is_some_and(|registered| !registered.off),
     };
     markers.iter().map(placement).collect()
+}
+
+/// The head in every frame where it was estimated.
+fn free_heads(heads: &[(usize, FreeHead)], registration: &Registration, recording: &Recording) -> Vec<FreeHeadRow> {
+    let of = registration.centre;
+    let row = |(index, head): &(usize, FreeHead)| FreeHeadRow {
+        frame: Frame { index: *index, time_s: recording.frames[*index].time_s },
+        motion: [head.motion.rotation_vector().map(f64::to_degrees), subtract(head.motion.place(of), of)],
+        sd: head.sd,
+        confounding: head.correlation.iter().zip(&head.inflation).map(|(c, i)| [*c, *i]).collect(),
+    };
+    heads.iter().map(row).collect()
 }
 
 /// The head in every frame of the recording.

@@ -28,7 +28,8 @@ pub(super) fn convert(
         [unit] => Units::from_name(unit),
         _ => None,
     };
-    let units = units.or(known).ok_or_else(|| Error::NoUnits { path: input.into(), declared: declared.join(", ").into() })?;
+    let units =
+        units.or(known).ok_or_else(|| Error::NoUnits { path: input.into(), declared: declared.join(", ").into() })?;
     if units != Units::Mm {
         recording = markers::read(input, &ReadOptions { topic, units, ..ReadOptions::default() })?;
     }
@@ -99,7 +100,10 @@ fn tables(scene: &Scene, found: &Proposal) -> (String, usize) {
             None => format!("{:?}    # no label is left for it", spec.label),
         };
         let sd = spec.sd_mm.map(|sd_mm| format!("sd_mm = {sd_mm:?}\n")).unwrap_or_default();
-        page += &format!("[[marker]]\nname = {:?}\nlabel = {label}\nposition_mm = {:?}\n{sd}", spec.name, spec.position_mm);
+        page += &format!(
+            "[[marker]]\nname = {:?}\nlabel = {label}\nposition_mm = {:?}\n{sd}",
+            spec.name, spec.position_mm
+        );
     }
     (page, changed)
 }

@@ -73,9 +73,7 @@ fn clip(source: &Source, scene: &Scene, fit: &FitSpec) -> Result<Clip> {
         Err(_) => Err(Error::Mistakes(Vec::new())),
     };
     match (frames, placed) {
-        (Ok(frames), Ok((markers, registration))) => {
-            Ok(Clip { recording, registration, frames, markers, warnings })
-        }
+        (Ok(frames), Ok((markers, registration))) => Ok(Clip { recording, registration, frames, markers, warnings }),
         (frames, placed) => {
             let mistakes = [frames.err(), placed.err()].into_iter().flatten();
             Err(Error::all(mistakes.flat_map(Error::into_mistakes).collect()))

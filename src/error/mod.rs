@@ -14,8 +14,8 @@ use std::path::PathBuf;
 pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
-pub use registration::{Cause, Misregistration};
 use recording::{encapsulation_name, list_topics};
+pub use registration::{Cause, Misregistration};
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -749,6 +749,18 @@ pub enum Error {
         /// Its time, s.
         time_s: f64,
     },
+    /// A frame shows too few markers to say where the head is.
+    #[error(
+        "frame {frame} at {time_s:.3} s shows {markers} markers: where the head is takes three that do not lie on a line"
+    )]
+    HeadNotSeen {
+        /// Frame of the recording.
+        frame: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// Markers that it shows.
+        markers: usize,
+    },
     /// The optimiser stopped for a reason of its own.
     #[error("the optimiser stopped: {message}")]
     Optimiser {
@@ -874,6 +886,7 @@ impl Error {
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
+            Error::HeadNotSeen { .. } => "F020",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
             Error::FileExists { .. } => "O003",

@@ -141,7 +141,7 @@ impl Error {
                 "raise fit.max_iterations, or look at the residuals: do the labels and positions belong together?"
                     .into(),
             ),
-            Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
+            Error::HeadNotSeen { .. } | Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
             Error::Axes { .. } => Some(
                 "a table x,y,z,vx,vy,vz as CSV, a field of vectors or tensors in a VTK, VTU or VTP file, lines in one, or a \
                  field of vectors at the nodes of an EX file is read; write field = \"..\" to choose one of several"

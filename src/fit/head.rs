@@ -68,7 +68,7 @@ pub fn still(
 ) -> Result<Option<(HeadMotion, Vec<Warning>)>> {
     let spec = &fit.registration;
     let (frames, slipped) = match &spec.head {
-        HeadSpec::None => return Ok(None),
+        HeadSpec::None | HeadSpec::Estimate => return Ok(None),
         HeadSpec::BoneMarkers(labels) => from_markers(fit, labels, recording, neutral)?,
         HeadSpec::PoseTopic(_) => (from_poses(fit, recording, neutral, poses)?, Vec::new()),
     };
@@ -215,7 +215,7 @@ impl HeadMotion {
     /// A paragraph of a page; `of` is the point whose shift is told.
     pub fn describe(&self, of: [f64; 3]) -> String {
         let source = match &self.source {
-            HeadSpec::None => return String::new(),
+            HeadSpec::None | HeadSpec::Estimate => return String::new(),
             HeadSpec::BoneMarkers(labels) => format!("from {} bone markers", labels.len()),
             HeadSpec::PoseTopic(topic) => format!("from the poses of `{topic}`"),
         };
@@ -228,13 +228,16 @@ impl HeadMotion {
             "head: taken out {source}; it turns by up to {turn:.2} degrees (frame {turn_frame}) and moves by up to {shift:.2} mm \
              (frame {shift_frame})\n"
         );
-        let known: Vec<(usize, f64)> = self.frames.iter().enumerate().filter_map(|(k, f)| Some((k, f.rms_mm?))).collect();
+        let known: Vec<(usize, f64)> =
+            self.frames.iter().enumerate().filter_map(|(k, f)| Some((k, f.rms_mm?))).collect();
         if let Some((worst, most)) = known.iter().max_by(|a, b| a.1.total_cmp(&b.1)) {
             let mean = rms(&known.iter().map(|(_, rms)| *rms).collect::<Vec<_>>());
             text += &format!("  bone markers agree to an rms of {mean:.3} mm, {most:.3} mm in frame {worst}\n");
         }
         for Slip { label, frames, shown, most_mm, .. } in &self.slipped {
-            text += &format!("  `{label}` is off in {frames} of {shown} frames, by up to {most_mm:.2} mm, and does not count there\n");
+            text += &format!(
+                "  `{label}` is off in {frames} of {shown} frames, by up to {most_mm:.2} mm, and does not count there\n"
+            );
         }
         text
     }

@@ -11,6 +11,7 @@ pub mod bias;
 pub mod bounded_step;
 pub mod covariance;
 pub mod frame;
+pub mod free_head;
 pub mod gauss_newton;
 pub mod head;
 pub mod placement;

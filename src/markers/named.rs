@@ -33,8 +33,11 @@ pub(super) const POSE_ARRAY: Named =
     Named { name: "pose array", schemas: &["geometry_msgs/PoseArray"], observe: pose_array };
 
 /// `foxglove.PointCloud`
-pub(super) const POINT_CLOUD: Named =
-    Named { name: "point cloud", schemas: &["foxglove.PointCloud", "foxglove_msgs/PointCloud"], observe: point_cloud };
+pub(super) const POINT_CLOUD: Named = Named {
+    name: "point cloud",
+    schemas: &["foxglove.PointCloud", "foxglove_msgs/PointCloud"],
+    observe: point_cloud,
+};
 
 /// `foxglove.SceneUpdate`
 pub(super) const SCENE_UPDATE: Named = Named {

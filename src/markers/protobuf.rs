@@ -18,7 +18,9 @@ impl Protobuf {
         let pool = DescriptorPool::decode(schema.text.as_slice())
             .map_err(|error| Unreadable::Descriptors { message: error.to_string() })?;
         let message = pool.get_message_by_name(&schema.name);
-        message.map(Protobuf).ok_or_else(|| Unreadable::Descriptors { message: format!("no `{}` in them", schema.name) })
+        message
+            .map(Protobuf)
+            .ok_or_else(|| Unreadable::Descriptors { message: format!("no `{}` in them", schema.name) })
     }
 }
 

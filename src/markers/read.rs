@@ -203,7 +203,12 @@ pub(super) fn decode(
 }
 
 /// Reads a file that holds markers and nothing else.
-pub(super) fn read_file(format: &dyn FileFormat, path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+pub(super) fn read_file(
+    format: &dyn FileFormat,
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+) -> Result<Recording> {
     if let Some(topic) = &options.topic {
         let (path, topic) = (path.into(), topic.clone());
         return Err(Error::TopicNotFound { path, topic, nearest: None, topics: Vec::new() });

@@ -390,7 +390,8 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         sd_mm,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
-        registration: RegistrationSpec { register, neutral, axes, head, head_place: _, register_place: _, neutral_place: _ },
+        registration:
+            RegistrationSpec { register, neutral, axes, head, head_place: _, register_place: _, neutral_place: _ },
         tolerance,
         max_iterations,
         finite_difference_step,
@@ -410,7 +411,11 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
     let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
-    lines.extend(["\n[fit]".into(), format!("markers = {}", path(markers)), format!("units = \"{}\"", units.map_or("estimate", Units::name))]);
+    lines.extend([
+        "\n[fit]".into(),
+        format!("markers = {}", path(markers)),
+        format!("units = \"{}\"", units.map_or("estimate", Units::name)),
+    ]);
     lines.extend(topic.as_ref().map(|topic| format!("topic = {}", text(topic))));
     lines.extend([
         format!("sensitivity = \"{sensitivity}\""),
@@ -437,6 +442,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         HeadSpec::BoneMarkers(labels) => {
             lines.extend(["\n[fit.head]".into(), format!("bone_markers = [{}]", quoted(labels))]);
         }
+        HeadSpec::Estimate => lines.extend(["\n[fit.head]".into(), "estimate = true".into()]),
         HeadSpec::PoseTopic(topic) => lines.extend(["\n[fit.head]".into(), format!("pose_topic = {}", text(topic))]),
     }
 }

@@ -33,7 +33,15 @@ pub(super) fn registration(table: &mut Table, units: Option<Option<Units>>) -> O
             .item("units")?
             .out_of_range("\"estimate\"", "mm, cm or m where register is not \"similarity\", which finds the scale");
     }
-    Some(RegistrationSpec { register: register?, neutral: neutral?, axes: axes?, head: head?, head_place, register_place, neutral_place })
+    Some(RegistrationSpec {
+        register: register?,
+        neutral: neutral?,
+        axes: axes?,
+        head: head?,
+        head_place,
+        register_place,
+        neutral_place,
+    })
 }
 
 /// Fewer bone markers do not say how a head is turned.
@@ -47,11 +55,17 @@ fn head(table: &mut Table) -> Option<HeadSpec> {
         known.dedup();
         if known.len() < BONE_MARKERS {
             let found = format!("{} different labels", known.len());
-            return item.wrong_length(&found, "at least 3, which do not lie on a line; with 4 one that slips can be told");
+            return item
+                .wrong_length(&found, "at least 3, which do not lie on a line; with 4 one that slips can be told");
         }
         Some(HeadSpec::BoneMarkers(known))
     };
-    table.one_of(&[("bone_markers", markers), ("pose_topic", |item| item.name().map(HeadSpec::PoseTopic))])
+    let estimate: Reader<HeadSpec> = |item| match item.flag()? {
+        true => Some(HeadSpec::Estimate),
+        false => item.out_of_range("false", "true; without the table the head does not move"),
+    };
+    let topic: Reader<HeadSpec> = |item| item.name().map(HeadSpec::PoseTopic);
+    table.one_of(&[("bone_markers", markers), ("pose_topic", topic), ("estimate", estimate)])
 }
 
 /// Each coordinate once.

@@ -870,6 +870,8 @@ pub enum HeadSpec {
     BoneMarkers(Vec<String>),
     /// From poses in another topic of the recording.
     PoseTopic(String),
+    /// It is estimated in every frame together with the controls.
+    Estimate,
 }
 
 /// An axis of a recording, or its opposite: `"x"`, `"-x"`, ...

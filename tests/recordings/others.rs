@@ -4,9 +4,7 @@
 use super::writer::{Cdr, Message, Topic};
 use prost_reflect::prost::Message as _;
 use prost_reflect::prost_types::field_descriptor_proto::{Label, Type};
-use prost_reflect::prost_types::{
-    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
-};
+use prost_reflect::prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 use prost_reflect::{DescriptorPool, DynamicMessage, Value};
 
 /// A `Message` that was logged at its stamp.
@@ -167,9 +165,8 @@ fn stamp_json(stamp: i64) -> String {
 
 /// `foxglove.PointCloud` in JSON; the cloud itself is placed by position and quaternion.
 pub fn cloud_json(frames: &[(i64, Vec<[f64; 3]>)], [px, py, pz]: [f64; 3], [x, y, z, w]: [f64; 4]) -> Topic {
-    let columns = COLUMNS.map(|(name, offset, kind)| {
-        format!(r#"{{"name": "{name}", "offset": {offset}, "type": {kind}}}"#)
-    });
+    let columns =
+        COLUMNS.map(|(name, offset, kind)| format!(r#"{{"name": "{name}", "offset": {offset}, "type": {kind}}}"#));
     let payload = |(stamp, points): &(i64, Vec<[f64; 3]>)| {
         let text = format!(
             r#"{{"timestamp": {}, "frame_id": "lab", "pose": {{"position": {{"x": {px:?}, "y": {py:?}, "z": {pz:?}}},
@@ -279,10 +276,8 @@ fn built(pool: &DescriptorPool, name: &str, fields: Vec<(&str, Value)>) -> Dynam
 }
 
 fn stamp(pool: &DescriptorPool, stamp: i64) -> Value {
-    let parts = vec![
-        ("seconds", Value::I64(stamp / 1_000_000_000)),
-        ("nanos", Value::I32((stamp % 1_000_000_000) as i32)),
-    ];
+    let parts =
+        vec![("seconds", Value::I64(stamp / 1_000_000_000)), ("nanos", Value::I32((stamp % 1_000_000_000) as i32))];
     Value::Message(built(pool, "Timestamp", parts))
 }
 

@@ -165,7 +165,8 @@ fn registration(
         // the noise is in the recording: least squares towards it, or the scale would come out too small
         let back: Vec<Pair> = agreeing.iter().map(|(z, x)| (*x, *z)).collect();
         if let Some(motion) = least_squares(&back, allowed).map(|motion| motion.inverse()) {
-            placed = Agreed { motion, distances: motion.distances(&neutral.pairs), rms: motion.rms(&agreeing), ..placed };
+            placed =
+                Agreed { motion, distances: motion.distances(&neutral.pairs), rms: motion.rms(&agreeing), ..placed };
         }
     }
     let warning = diagnosis::diagnose(&neutral, &placed, allowed)?;
@@ -243,7 +244,10 @@ impl std::fmt::Display for Registration {
         }
         let off: Vec<&str> = markers.iter().filter(|m| m.off).map(|m| m.name.as_str()).collect();
         let counted = markers.len() - off.len();
-        writeln!(out, "\n  its frame {neutral} fits the model at rest with an rms of {rms_mm:.3} mm over {counted} markers")?;
+        writeln!(
+            out,
+            "\n  its frame {neutral} fits the model at rest with an rms of {rms_mm:.3} mm over {counted} markers"
+        )?;
         if !off.is_empty() {
             writeln!(out, "  {} did not count, being farther off: {}", off.len(), off.join(", "))?;
         }

@@ -53,7 +53,12 @@ struct File<'a> {
 impl<'a> File<'a> {
     fn part(self, at: usize, length: usize) -> Result<&'a [u8]> {
         let part = at.checked_add(length).and_then(|end| self.bytes.get(at..end));
-        part.ok_or_else(|| Wrong::byte(at, format!("the file ends {} bytes too early here", (at + length).saturating_sub(self.bytes.len()))))
+        part.ok_or_else(|| {
+            Wrong::byte(
+                at,
+                format!("the file ends {} bytes too early here", (at + length).saturating_sub(self.bytes.len())),
+            )
+        })
     }
 
     fn byte(self, at: usize) -> Result<u8> {
@@ -132,7 +137,8 @@ fn parameters(file: File<'_>, start: usize, end: usize) -> Result<Parameters> {
             }
             let sizes = file.part(offset_at + 4, dimensions)?.iter().map(|size| usize::from(*size)).collect();
             let parameter = Parameter { kind, sizes, at: offset_at + 4 + dimensions };
-            let bytes = parameter.sizes.iter().try_fold(usize::from(kind.unsigned_abs()), |all, n| all.checked_mul(*n));
+            let bytes =
+                parameter.sizes.iter().try_fold(usize::from(kind.unsigned_abs()), |all, n| all.checked_mul(*n));
             if bytes.is_none_or(|bytes| parameter.at + bytes > end) {
                 return Err(Wrong::byte(at, format!("parameter `{name}` does not fit into the parameters")));
             }
@@ -180,7 +186,9 @@ impl FileFormat for C3d {
         let (first, last) = (file.unsigned(6)?, file.unsigned(8)?);
         let scale = file.float(12)?;
         let data = file.unsigned(16)?.checked_sub(1).map(|blocks| blocks * BLOCK);
-        let data = data.filter(|data| *data >= end).ok_or_else(|| Wrong::byte(16, "the data start inside the parameters"))?;
+        let data = data
+            .filter(|data| *data >= end)
+            .ok_or_else(|| Wrong::byte(16, "the data start inside the parameters"))?;
         let rate = file.float(20)?;
         let agrees = |name: &str, header: f64, tolerance: f64| match number(name) {
             Some(value) if (value - header).abs() > tolerance => {
@@ -222,10 +230,18 @@ impl FileFormat for C3d {
             let point = |(k, label): (usize, &String)| {
                 let at = at + 4 * size * k;
                 let value = |c: usize| -> Result<f64> {
-                    if scale < 0.0 { file.float(at + 4 * c) } else { file.word(at + 2 * c).map(|w| f64::from(w) * scale) }
+                    if scale < 0.0 {
+                        file.float(at + 4 * c)
+                    } else {
+                        file.word(at + 2 * c).map(|w| f64::from(w) * scale)
+                    }
                 };
                 let residual = if scale < 0.0 { value(3)? } else { f64::from(file.word(at + 6)?) };
-                let sample = if residual < 0.0 { Sample::Invalid } else { Sample::Position([value(0)?, value(1)?, value(2)?]) };
+                let sample = if residual < 0.0 {
+                    Sample::Invalid
+                } else {
+                    Sample::Position([value(0)?, value(1)?, value(2)?])
+                };
                 Ok((label.clone(), sample))
             };
             tracks.frames.push(labels.iter().enumerate().map(point).collect::<Result<_>>()?);
@@ -253,7 +269,8 @@ fn frames(file: File<'_>, parameters: &Parameters, first: usize, last: usize) ->
         return Ok(long as usize);
     }
     let count = (last + 1).checked_sub(first).filter(|count| *count > 0);
-    let count = count.ok_or_else(|| Wrong::byte(6, format!("the last frame {last} lies before the first, {first}")))?;
+    let count =
+        count.ok_or_else(|| Wrong::byte(6, format!("the last frame {last} lies before the first, {first}")))?;
     match parameters.get("POINT:FRAMES").and_then(|p| p.number(file)) {
         Some(frames) if frames != count as f64 && count < 65_535 => {
             Err(Wrong::byte(6, format!("the header counts {count} frames, parameter POINT:FRAMES {frames}")))

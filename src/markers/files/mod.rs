@@ -76,7 +76,8 @@ pub(super) fn read(format: &dyn FileFormat, path: &Path, bytes: &[u8], allow_tru
 /// A text in whole lines: (number from 1, line). The last one must be closed, or a number in it could have lost digits; where a
 /// short file is allowed it is left out.
 fn lines(bytes: &[u8], allow_truncated: bool) -> std::result::Result<(Vec<(usize, &str)>, bool), Wrong> {
-    let text = std::str::from_utf8(bytes).map_err(|error| Wrong::byte(error.valid_up_to(), "this is not UTF-8 text"))?;
+    let text =
+        std::str::from_utf8(bytes).map_err(|error| Wrong::byte(error.valid_up_to(), "this is not UTF-8 text"))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let closed = text.ends_with('\n') || text.is_empty();
     let mut lines: Vec<(usize, &str)> = text.lines().enumerate().map(|(index, line)| (index + 1, line)).collect();

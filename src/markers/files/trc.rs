@@ -51,7 +51,8 @@ impl FileFormat for Trc {
         if labels.first() != Some(&"Frame#") || labels.get(1) != Some(&"Time") {
             return Err(Wrong::line(4, "the labels start with `Frame#` and `Time`"));
         }
-        let labels: Vec<String> = labels.iter().skip(2).filter(|label| !label.is_empty()).map(|l| l.to_string()).collect();
+        let labels: Vec<String> =
+            labels.iter().skip(2).filter(|label| !label.is_empty()).map(|l| l.to_string()).collect();
         if labels.len() != markers {
             return Err(Wrong::line(4, format!("there are {} labels, NumMarkers says {markers}", labels.len())));
         }
@@ -61,7 +62,8 @@ impl FileFormat for Trc {
         if axes.len() != 3 * markers || axes.iter().enumerate().any(|(k, axis)| *axis != expected(k)) {
             return Err(Wrong::line(5, format!("the axes are not X1, Y1, Z1 to Z{markers}")));
         }
-        let mut tracks = Tracks { units: setting("Units").map(str::to_owned).into_iter().collect(), ..Tracks::default() };
+        let mut tracks =
+            Tracks { units: setting("Units").map(str::to_owned).into_iter().collect(), ..Tracks::default() };
         let mut last: Option<(f64, f64)> = None;
         for (line, text) in lines.iter().skip(5).filter(|(_, text)| !text.trim().is_empty()) {
             let line = *line;

@@ -11,8 +11,8 @@ mod schema;
 use self::cdr::Value;
 use self::schema::{Count, Field, Kind, Types};
 use super::fields::SchemaRecord;
-use super::message::{Payload, Tree};
 use super::format::{DecodeFault, Decoder, Format, Observation, Sample, stamp_ns};
+use super::message::{Payload, Tree};
 use crate::error::{Fault, Unreadable};
 
 /// `mocap4r2_msgs/msg/Markers`.

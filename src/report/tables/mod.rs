@@ -25,7 +25,7 @@ pub use cost::write_cost;
 pub use energies::EnergyTable;
 pub use estimate::EstimateTable;
 pub use fit::FitTable;
-pub use head::{HeadRow, write_head};
+pub use head::{FreeHeadRow, HeadRow, write_free_head, write_head};
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
 pub use probes::ProbeTable;

@@ -26,7 +26,8 @@ pub fn write_registration(run: &RunFolder, placements: &[Placement<'_>]) -> Resu
     let mut table = Table::create(&run.tables(), "registration", columns)?;
     let mut rows = Rows::default();
     for Placement { name, skin_mm, neutral_mm, counted } in placements {
-        let cells: [Cell<'_>; 4] = [(*name).into(), (*skin_mm).into(), (*neutral_mm).into(), usize::from(*counted).into()];
+        let cells: [Cell<'_>; 4] =
+            [(*name).into(), (*skin_mm).into(), (*neutral_mm).into(), usize::from(*counted).into()];
         rows.add(cells);
     }
     table.append(rows)
