@@ -10,9 +10,12 @@ use super::run::{Run, Tally};
 use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
+use crate::fit::placement::Marker;
+use crate::fit::registration::Registration;
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
+use crate::report::tables::{Placement, write_registration};
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
 use crate::report::{FailedFrame, Frame, MarkerPair, Record};
 use crate::scene::{ControlRange, FitSpec, Scene};
@@ -22,7 +25,7 @@ pub(super) fn fit(
     scene: &Scene,
     spec: &FitSpec,
     prepared: &Prepared,
-    Clip { recording, frames, .. }: &Clip,
+    Clip { recording, registration, frames, .. }: &Clip,
     run: &Run,
     flags: &Flags,
     work: &mut Work,
@@ -32,6 +35,7 @@ pub(super) fn fit(
     let probes = probes(scene, built);
     let mut fit = Fit::new(model, scene, spec, recording)?;
     let names: Vec<String> = fit.markers().iter().map(|m| m.name.clone()).collect();
+    write_registration(&run.folder, &placements(fit.markers(), registration))?;
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, true)?;
     let ranges = scene.control_ranges();
     let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
@@ -85,6 +89,7 @@ pub(super) fn fit(
     let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
     let summary = FitSummary {
         name: &scene.name,
+        recording: &registration.to_string(),
         controls: &controls,
         bones: !model.bones().is_empty(),
         frames: &fitted,
@@ -99,6 +104,18 @@ pub(super) fn fit(
     run.folder.write("summary.txt", &page)?;
     print(&page)?;
     Ok(tally)
+}
+
+/// Where each marker sits, and how the neutral frame fits there.
+fn placements<'m>(markers: &'m [Marker], registration: &Registration) -> Vec<Placement<'m>> {
+    let shown = |m: &Marker| registration.markers.iter().find(|registered| registered.name == m.name);
+    let placement = |m: &'m Marker| Placement {
+        name: &m.name,
+        skin_mm: m.distance,
+        neutral_mm: shown(m).map(|registered| registered.distance_mm),
+        counted: shown(m).is_some_and(|registered| !registered.off),
+    };
+    markers.iter().map(placement).collect()
 }
 
 /// The name of a control, with its unit where it has one.

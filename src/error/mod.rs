@@ -6,6 +6,7 @@
 mod likely;
 mod place;
 mod recording;
+mod registration;
 mod remedy;
 
 use std::path::PathBuf;
@@ -13,6 +14,7 @@ use std::path::PathBuf;
 pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
+pub use registration::{Cause, Misregistration};
 use recording::{encapsulation_name, list_topics};
 
 /// The result of everything in this crate that can fail.
@@ -361,8 +363,8 @@ pub enum Error {
         labels: usize,
         /// The unit in the problem file.
         declared: &'static str,
-        /// The unit that would explain the ratio.
-        likely: &'static str,
+        /// The unit that would explain the ratio, if one does.
+        likely: Option<&'static str>,
         /// The unit in the problem file.
         place: Box<Place>,
     },
@@ -404,6 +406,9 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
+    /// The recording does not lie on the model.
+    #[error("{0}")]
+    Misregistered(Box<Misregistration>),
     // ---- G: geometry ----------------------------------------------------------------------------------
     /// The reference geometry of the host is inverted.
     #[error("the mesh is inverted: element {element} at xi ({:.3}, {:.3}, {:.3}) has det(dX/dxi) = {det:.3e} mm3", xi[0], xi[1], xi[2])]
@@ -801,6 +806,7 @@ impl Error {
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
             Error::NoSuchFrame { .. } => "K004",
+            Error::Misregistered(wrong) => wrong.code(),
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -876,6 +882,7 @@ impl Error {
             | Error::NoAxes { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
+            Error::Misregistered(wrong) => Some(&wrong.place),
             Error::Named(named) => Some(&named.1),
             _ => None,
         }

@@ -14,6 +14,7 @@ mod fit;
 mod markers;
 mod muscles;
 mod probes;
+mod registration;
 
 pub use activations::ActivationTable;
 pub use bones::BoneTable;
@@ -26,6 +27,7 @@ pub use fit::FitTable;
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
 pub use probes::ProbeTable;
+pub use registration::{Placement, write_registration};
 
 use super::frame::Frame;
 use super::run_folder::failed;
