@@ -4,8 +4,10 @@
 //! 4 not converged (what converged is written), 5 warnings under `--strict`, 6 input or output failed, 130 interrupted.
 
 mod check;
+mod completions;
 pub mod diagnostics;
 mod estimate;
+mod explain;
 mod fibres;
 mod fit;
 mod forward;
@@ -25,6 +27,7 @@ use diagnostics::{Colour, render_error, render_warning};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::error::explain::Page;
 use crate::error::{Error, Result, Warning};
 
 /// Finds out which muscles moved a face.
@@ -66,6 +69,17 @@ enum Command {
         /// As JSON
         #[arg(long)]
         json: bool,
+    },
+    /// What the code of a message means, and what to do; without one, a list of all
+    Explain {
+        /// For example S003
+        #[arg(value_parser = explain::code)]
+        code: Vec<Page>,
+    },
+    /// A script that completes commands and flags: risorius completions bash > ~/.local/share/bash-completion/completions/risorius
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
     },
 }
 
@@ -197,9 +211,16 @@ pub fn main() -> ExitCode {
         Ok(ending) => ExitCode::from(ending.exit_code()),
         Err(error) => {
             terminal::tell(&render_error(&error, colour));
+            terminal::tell(&more_about(error.mistakes().iter().map(Error::code)));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Where the pages of codes are.
+fn more_about<'c>(codes: impl Iterator<Item = &'c str>) -> String {
+    let codes: std::collections::BTreeSet<&str> = codes.collect();
+    format!("\nmore: risorius explain {}\n", codes.into_iter().collect::<Vec<_>>().join(" "))
 }
 
 /// `risorius problem.toml` lacks a command; the message says which.
@@ -231,5 +252,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
         Some(Command::New { folder, template }) => new::new(folder, *template),
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
+        Some(Command::Explain { code }) => explain::explain(code),
+        Some(Command::Completions { shell }) => completions::completions(*shell),
     }
 }

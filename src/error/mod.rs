@@ -1,8 +1,9 @@
 //! The one error type. Every variant has a stable code, carries the numbers a reader needs, and a remedy.
 //!
 //! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
-//! `O` output. A code never changes its meaning; a retired code is not used again.
+//! `O` output. A code never changes its meaning; a retired code is not used again. Every code has a page in [`explain`].
 
+pub mod explain;
 mod likely;
 mod place;
 mod recording;
