@@ -8,6 +8,7 @@ mod completions;
 pub mod diagnostics;
 mod estimate;
 mod explain;
+mod export;
 mod fibres;
 mod fit;
 mod forward;
@@ -29,6 +30,7 @@ use std::process::ExitCode;
 
 use crate::error::explain::Page;
 use crate::error::{Error, Result, Warning};
+use crate::report::export::Format;
 
 /// Finds out which muscles moved a face.
 ///
@@ -62,13 +64,24 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Template::Face)]
         template: Template,
     },
-    /// What is in a marker recording
+    /// What is in a marker recording, or in the folder of a run
     Inspect {
-        /// An MCAP file
+        /// An MCAP file, or a folder
         file: PathBuf,
         /// As JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Write a finished run for other programs; nothing is solved again
+    Export {
+        /// The folder of a run
+        run: PathBuf,
+        /// Formats, with commas between them
+        #[arg(long, value_enum, value_delimiter = ',', required = true)]
+        to: Vec<Format>,
+        /// The frame for formats of one frame [default: the one that moved most]
+        #[arg(long, value_name = "N")]
+        frame: Option<usize>,
     },
     /// What the code of a message means, and what to do; without one, a list of all
     Explain {
@@ -252,6 +265,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
         Some(Command::New { folder, template }) => new::new(folder, *template),
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
+        Some(Command::Export { run, to, frame }) => export::export(run, to, *frame, &cli.flags),
         Some(Command::Explain { code }) => explain::explain(code),
         Some(Command::Completions { shell }) => completions::completions(*shell),
     }
