@@ -388,7 +388,7 @@ fn files_are_converted_to_mcap() {
     }
     let again = ["markers", "convert", "test.trc", "0.mcap"];
     let (exit, _, stderr) = risorius(folder.path(), &again);
-    assert!(exit == 6 && stderr.contains("O003"), "{stderr}");
+    assert!(exit == 6 && stderr.contains("O008"), "{stderr}");
     assert_eq!(risorius(folder.path(), &[&again[..], &["--force"]].concat()).0, 0);
     let (exit, _, stderr) = risorius(folder.path(), &["markers", "convert", "test.trc", "m.mcap", "--units", "m"]);
     assert!(exit == 0 && stderr.contains("M020") && stderr.contains("`mm`"), "{stderr}");

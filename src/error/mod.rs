@@ -1,8 +1,9 @@
 //! The one error type. Every variant has a stable code, carries the numbers a reader needs, and a remedy.
 //!
 //! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
-//! `O` output. A code never changes its meaning; a retired code is not used again.
+//! `O` output. A code never changes its meaning; a retired code is not used again. Every code has a page in [`explain`].
 
+pub mod explain;
 mod likely;
 mod place;
 mod recording;
@@ -792,6 +793,38 @@ pub enum Error {
         /// What is in it.
         entries: usize,
     },
+    /// A folder is not that of a run which can be looked at.
+    #[error("{} is not the folder of a run: it lacks {lacks}", path.display())]
+    NotARun {
+        /// The folder.
+        path: PathBuf,
+        /// What is not there.
+        lacks: &'static str,
+    },
+    /// A run has kept no shapes.
+    #[error("the run in {} has kept no shape of any frame (view/result_<frame>.exf)", path.display())]
+    NoShapes {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file in the folder of a run is not as the run wrote it.
+    #[error("{} is not what a run wrote: {message}", path.display())]
+    DamagedRun {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: Box<str>,
+    },
+    /// A run has no shape of the frame asked for.
+    #[error("the run in {} has no shape of frame {frame}: it has {kept}", path.display())]
+    NoSuchShape {
+        /// The folder.
+        path: PathBuf,
+        /// The frame asked for.
+        frame: usize,
+        /// The frames it has.
+        kept: Box<str>,
+    },
 }
 
 impl Error {
@@ -889,9 +922,13 @@ impl Error {
             Error::HeadNotSeen { .. } => "F020",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
-            Error::FileExists { .. } => "O003",
+            Error::FileExists { .. } => "O008",
             Error::NoUnits { .. } => "M016",
             Error::NothingToMatch { .. } => "K017",
+            Error::NotARun { .. } => "O003",
+            Error::NoShapes { .. } => "O004",
+            Error::DamagedRun { .. } => "O005",
+            Error::NoSuchShape { .. } => "O006",
         }
     }
 

@@ -185,6 +185,10 @@ impl Error {
             Error::FolderNotEmpty { .. } => {
                 Some("choose another --out, or add --force to replace the run that is in it".into())
             }
+            Error::NotARun { .. } => Some("name the folder that a run printed, for example runs/beam-0001".into()),
+            Error::NoShapes { .. } => Some("run again with view = true in [output]".into()),
+            Error::DamagedRun { .. } => Some("run again: `risorius run` on its problem.lock.toml".into()),
+            Error::NoSuchShape { .. } => Some("choose one of these, or run again with every = 1 in [output]".into()),
         }
     }
 }
