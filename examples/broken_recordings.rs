@@ -4,7 +4,6 @@
 //! (`mocap4r2_msgs/msg/Markers`, CDR), and each thing that can be wrong with such a file.
 
 #[path = "../tests/recordings/writer.rs"]
-#[allow(dead_code)] // shared with the tests of recordings, which need all of it
 mod writer;
 
 use std::path::Path;

@@ -9,7 +9,7 @@ mod writer;
 
 use assert_cmd::Command;
 use files::{Processor, Tracks};
-use others::Shown;
+use others::{Entities, Shown};
 use risorius::markers::{
     Clock, Fault, Missing, ReadOptions, Recording, Units, Warning, inspect_bytes, read, read_bytes,
 };
@@ -47,7 +47,7 @@ fn frames(count: usize) -> Vec<(i64, Vec<[f64; 3]>)> {
     (0..count).map(|frame| (stamp(frame), positions(frame))).collect()
 }
 
-fn named(count: usize) -> Vec<(i64, Vec<(String, [f64; 3])>)> {
+fn named(count: usize) -> Vec<Entities> {
     let label = |(marker, p): (usize, &[f64; 3])| (format!("M{marker}"), *p);
     frames(count).iter().map(|(stamp, p)| (*stamp, p.iter().enumerate().map(label).collect())).collect()
 }
@@ -71,7 +71,10 @@ fn check(recording: &Recording, label: impl Fn(usize) -> String, frames: usize, 
     }
 }
 
-fn message_topics(count: usize) -> Vec<(&'static str, Topic, fn(usize) -> String)> {
+/// Name of the format, messages, and what each marker is called.
+type Messages = (&'static str, Topic, fn(usize) -> String);
+
+fn message_topics(count: usize) -> Vec<Messages> {
     let nowhere = ([0.0; 3], [0.0, 0.0, 0.0, 1.0]);
     vec![
         ("pose array", others::pose_array(&frames(count)), |k| k.to_string()),
@@ -87,7 +90,7 @@ fn message_topics(count: usize) -> Vec<(&'static str, Topic, fn(usize) -> String
 fn messages_of_other_programs_give_the_same_tracks() {
     for (format, topic, label) in message_topics(20) {
         for kind in ["zstd", "lz4", "none"] {
-            let recording = load("test.mcap", &file(container(kind), &[topic.clone()])).unwrap();
+            let recording = load("test.mcap", &file(container(kind), std::slice::from_ref(&topic))).unwrap();
             check(&recording, label, 20, 0.0);
             assert_eq!((recording.source.format.as_str(), recording.source.clock), (format, Clock::Header));
             assert_eq!(recording.frames[3].stamp_ns, stamp(3));

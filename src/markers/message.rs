@@ -157,7 +157,7 @@ impl Tree {
             q = [0.0, 0.0, 0.0, 1.0];
         }
         let length = q.iter().map(|q| q * q).sum::<f64>().sqrt();
-        if !((length - 1.0).abs() < UNIT) {
+        if (length - 1.0).abs() >= UNIT || length.is_nan() {
             return Err(Fault::Quaternion { length });
         }
         Ok(Placed { position, orientation: q.map(|q| q / length) })

@@ -151,7 +151,7 @@ pub fn weighted(pairs: &[Pair], weight: impl Fn(usize) -> f64, allowed: Allowed)
     }
     let svd = covariance.svd(true, true);
     let (u, v, d) = (svd.u?, svd.v_t?, svd.singular_values);
-    if !(d[1] > 1e-9 * d[0]) {
+    if d[1] <= 1e-9 * d[0] || d[1].is_nan() {
         return None;
     }
     let proper = u.determinant() * v.determinant() > 0.0;
@@ -204,7 +204,7 @@ pub fn robust(pairs: &[Pair], allowed: Allowed, least: f64) -> Option<Agreed> {
             let chosen: Vec<Pair> = best.iter().map(|k| pairs[*k]).collect();
             let Some(next) = least_squares(&chosen, allowed) else { break };
             let (lower, order) = trimmed(&next);
-            if !(lower < cost) {
+            if lower >= cost {
                 break;
             }
             (motion, cost, best) = (next, lower, order);

@@ -182,8 +182,11 @@ pub fn cloud_json(frames: &[(i64, Vec<[f64; 3]>)], [px, py, pz]: [f64; 3], [x, y
     Topic { name: "/cloud", schema, encoding: "json", unit: None, messages: frames.iter().map(payload).collect() }
 }
 
+/// Stamp (ns), and id and place of each entity.
+pub type Entities = (i64, Vec<(String, [f64; 3])>);
+
 /// `foxglove.SceneUpdate` in JSON: a sphere per entity, `null` where the place is not finite.
-pub fn scene_json(frames: &[(i64, Vec<(String, [f64; 3])>)]) -> Topic {
+pub fn scene_json(frames: &[Entities]) -> Topic {
     let entity = |stamp: i64, (id, p): &(String, [f64; 3])| {
         let [x, y, z] = p.map(|x| if x.is_finite() { format!("{x:?}") } else { "null".into() });
         format!(
@@ -193,7 +196,7 @@ pub fn scene_json(frames: &[(i64, Vec<(String, [f64; 3])>)]) -> Topic {
             stamp_json(stamp)
         )
     };
-    let payload = |(stamp, entities): &(i64, Vec<(String, [f64; 3])>)| {
+    let payload = |(stamp, entities): &Entities| {
         let entities: Vec<String> = entities.iter().map(|e| entity(*stamp, e)).collect();
         message(*stamp, format!(r#"{{"deletions": [], "entities": [{}]}}"#, entities.join(", ")).into_bytes())
     };
@@ -201,8 +204,11 @@ pub fn scene_json(frames: &[(i64, Vec<(String, [f64; 3])>)]) -> Topic {
     Topic { name: "/scene", schema, encoding: "json", unit: None, messages: frames.iter().map(payload).collect() }
 }
 
+/// Name, kind, and whether it is repeated, of each field.
+type Fields = &'static [(&'static str, &'static str, bool)];
+
 /// The messages of Foxglove that hold markers, and what they are made of: name, then fields as name, kind, repeated.
-const FOXGLOVE: [(&str, &[(&str, &str, bool)]); 9] = [
+const FOXGLOVE: [(&str, Fields); 9] = [
     ("Vector3", &[("x", "double", false), ("y", "double", false), ("z", "double", false)]),
     ("Quaternion", &[("x", "double", false), ("y", "double", false), ("z", "double", false), ("w", "double", false)]),
     ("Pose", &[("position", ".foxglove.Vector3", false), ("orientation", ".foxglove.Quaternion", false)]),
@@ -253,7 +259,7 @@ pub fn descriptors() -> Vec<u8> {
             ..FieldDescriptorProto::default()
         }
     };
-    let message = |(name, fields): &(&str, &[(&str, &str, bool)])| DescriptorProto {
+    let message = |(name, fields): &(&str, Fields)| DescriptorProto {
         name: Some(name.to_string()),
         field: fields.iter().enumerate().map(field).collect(),
         ..DescriptorProto::default()
@@ -312,7 +318,7 @@ pub fn cloud_protobuf(frames: &[(i64, Vec<[f64; 3]>)]) -> Topic {
 }
 
 /// `foxglove.SceneUpdate` in protobuf: a sphere per entity, without a pose where the place is not finite.
-pub fn scene_protobuf(frames: &[(i64, Vec<(String, [f64; 3])>)]) -> Topic {
+pub fn scene_protobuf(frames: &[Entities]) -> Topic {
     let pool = DescriptorPool::decode(descriptors().as_slice()).unwrap();
     let entity = |time: i64, (id, p): &(String, [f64; 3])| {
         let mut sphere = built(&pool, "SpherePrimitive", vec![("size", vector(&pool, [5.0; 3]))]);
@@ -328,7 +334,7 @@ pub fn scene_protobuf(frames: &[(i64, Vec<(String, [f64; 3])>)]) -> Topic {
         ];
         Value::Message(built(&pool, "SceneEntity", parts))
     };
-    let payload = |(time, entities): &(i64, Vec<(String, [f64; 3])>)| {
+    let payload = |(time, entities): &Entities| {
         let entities = entities.iter().map(|e| entity(*time, e)).collect();
         message(*time, built(&pool, "SceneUpdate", vec![("entities", Value::List(entities))]).encode_to_vec())
     };

@@ -102,7 +102,7 @@ fn matching(model: &[Vector], points: &[Vector], guess: &[(usize, usize)], allow
     let central: Vec<Vector> =
         points.iter().filter(|p| norm(subtract(**p, middle)) < STRAY * size).copied().collect();
     let starts = least_squares(&guessed, allowed).into_iter().chain(alignments(model, &central, allowed));
-    let mut ends: Vec<(f64, Vec<(usize, usize)>, Motion)> = Vec::new();
+    let mut ends: Vec<End> = Vec::new();
     for start in starts {
         let Some(end) = settle(model, points, start, allowed) else { continue };
         if !ends.iter().any(|(_, pairs, _)| *pairs == end.1) {
@@ -118,13 +118,11 @@ fn matching(model: &[Vector], points: &[Vector], guess: &[(usize, usize)], allow
     Some(Matching { points: found, rms_mm: *rms_mm, second_mm: ends.get(1).map(|end| end.0) })
 }
 
-/// Root mean square distance, pairs (point, marker) and motion where a start leads.
-fn settle(
-    model: &[Vector],
-    points: &[Vector],
-    start: Motion,
-    allowed: Allowed,
-) -> Option<(f64, Vec<(usize, usize)>, Motion)> {
+/// Where a start leads: root mean square distance, pairs (point, marker), motion.
+type End = (f64, Vec<(usize, usize)>, Motion);
+
+/// Assigns and moves until nothing changes.
+fn settle(model: &[Vector], points: &[Vector], start: Motion, allowed: Allowed) -> Option<End> {
     let (mut motion, mut known) = (start, Vec::new());
     for _ in 0..ROUNDS {
         let moved: Vec<Vector> = points.iter().map(|p| motion.place(*p)).collect();

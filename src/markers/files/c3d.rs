@@ -200,7 +200,7 @@ impl FileFormat for C3d {
         agrees("POINT:DATA_START", (data / BLOCK + 1) as f64, 0.0)?;
         agrees("POINT:RATE", rate, 1e-3 * rate.abs())?;
         agrees("POINT:SCALE", scale, 1e-6 * scale.abs())?;
-        if !(rate > 0.0 && rate.is_finite()) || !(scale.is_finite() && scale != 0.0) {
+        if !(rate > 0.0 && rate.is_finite() && scale.is_finite() && scale != 0.0) {
             return Err(Wrong::byte(12, format!("a frame rate of {rate} Hz and a scale of {scale} are none")));
         }
         let frames = frames(file, &parameters, first, last)?;

@@ -73,14 +73,17 @@ pub(super) fn read(format: &dyn FileFormat, path: &Path, bytes: &[u8], allow_tru
     format.read(bytes, allow_truncated).map_err(|wrong| wrong.error(path))
 }
 
-/// A text in whole lines: (number from 1, line). The last one must be closed, or a number in it could have lost digits; where a
+/// Number, from 1, and text of each line.
+type Lines<'a> = Vec<(usize, &'a str)>;
+
+/// A text in whole lines. The last one must be closed, or a number in it could have lost digits; where a
 /// short file is allowed it is left out.
-fn lines(bytes: &[u8], allow_truncated: bool) -> std::result::Result<(Vec<(usize, &str)>, bool), Wrong> {
+fn lines(bytes: &[u8], allow_truncated: bool) -> std::result::Result<(Lines<'_>, bool), Wrong> {
     let text =
         std::str::from_utf8(bytes).map_err(|error| Wrong::byte(error.valid_up_to(), "this is not UTF-8 text"))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let closed = text.ends_with('\n') || text.is_empty();
-    let mut lines: Vec<(usize, &str)> = text.lines().enumerate().map(|(index, line)| (index + 1, line)).collect();
+    let mut lines: Lines<'_> = text.lines().enumerate().map(|(index, line)| (index + 1, line)).collect();
     if !closed {
         let (number, _) = lines.pop().unwrap_or((1, ""));
         if !allow_truncated {

@@ -80,7 +80,7 @@ impl FileFormat for Trc {
             let (Some(frame), Some(time)) = (numbers[0], numbers[1]) else {
                 return Err(Wrong::line(line, "the row has no frame number or no time"));
             };
-            if last.is_some_and(|(before, earlier)| frame != before + 1.0 || !(time > earlier)) {
+            if last.is_some_and(|(before, earlier)| frame != before + 1.0 || time <= earlier || time.is_nan()) {
                 return Err(Wrong::line(line, format!("frame {frame} at {time} s does not follow the row before")));
             }
             last = Some((frame, time));
