@@ -243,14 +243,13 @@ impl<'m> Solver<'m> {
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
             let guess = match &before {
-                Some((earlier, state)) => self.balance.extrapolate(
-                    state,
-                    &last,
-                    (place - stepper.reached()) / (stepper.reached() - earlier),
-                ),
+                Some((earlier, state)) => {
+                    let ratio = (place - stepper.reached()) / (stepper.reached() - earlier);
+                    let predicted = self.balance.extrapolate(state, &last, ratio);
+                    self.nearer(predicted, &last)
+                }
                 None => last.clone(),
             };
-            let guess = self.nearer(guess, &last);
             let outcome = match self.attempt(guess, &last, limits) {
                 Ok(outcome) => outcome,
                 Err(error) => {
