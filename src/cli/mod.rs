@@ -18,6 +18,7 @@ mod noticed;
 mod prepare;
 mod problem;
 mod progress;
+mod report;
 mod run;
 mod study;
 mod terminal;
@@ -82,6 +83,11 @@ enum Command {
         /// The frame for formats of one frame [default: the one that moved most]
         #[arg(long, value_name = "N")]
         frame: Option<usize>,
+    },
+    /// Write a finished run as one page for a browser: report.html in its folder
+    Report {
+        /// The folder of a run
+        run: PathBuf,
     },
     /// What the code of a message means, and what to do; without one, a list of all
     Explain {
@@ -266,6 +272,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         Some(Command::New { folder, template }) => new::new(folder, *template),
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
         Some(Command::Export { run, to, frame }) => export::export(run, to, *frame, &cli.flags),
+        Some(Command::Report { run }) => report::report(run),
         Some(Command::Explain { code }) => explain::explain(code),
         Some(Command::Completions { shell }) => completions::completions(*shell),
     }
