@@ -168,7 +168,7 @@ fn every_named_face_is_where_its_name_says() {
     let count = |name: &str| whole.named_faces[name].len();
     assert_eq!((count("skin"), count("deep"), count("rim")), (560, 560, 2 * (28 + 20)));
     assert_eq!((count("lip.upper"), count("lip.lower"), count("lid.upper.L"), count("lid.lower.R")), (6, 6, 4, 4));
-    let parts = ["deep.perioral", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
+    let parts = ["deep.perioral", "deep.nose", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
     assert_eq!(parts.iter().sum::<usize>(), 560, "{parts:?}");
     // the lips touch: both margins are the same surface, and the corner of the mouth is where its landmark is
     for (upper, lower) in whole.named_faces["lip.upper"].iter().zip(&whole.named_faces["lip.lower"]) {
@@ -448,7 +448,7 @@ face = "zygomaticus_major"
 side = "L"
 blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
 [[support]]
-clamp = { face = ["rim", "deep.sliding"] }
+clamp = { face = ["rim", "deep.sliding", "deep.nose"] }
 [[support]]
 symmetry = { face = "midline" }
 [[attachment]]
@@ -481,6 +481,49 @@ fn a_muscle_pulls_the_corner_of_the_mouth_to_its_origin() {
     println!("the corner of the mouth moves by {moved:?} mm");
     assert!(norm(moved) > 0.2 && dot(moved, pull) > 0.8 * norm(moved), "{moved:?}, pulled along {pull:?}");
     assert_eq!(found.negative_modes, Some(0));
+}
+
+/// The face as in problems/smile with all muscles of the left side.
+fn all_muscles() -> Scene {
+    let text = std::fs::read_to_string("problems/smile/problem.toml").unwrap();
+    let face = built_in_face();
+    let names: Vec<String> = face.muscles.iter().map(|m| format!("\"{}\"", m.name)).collect();
+    let fixed = face.muscles.iter().filter(|m| !m.origin.is_empty()).map(|m| format!("\"{}\"", m.name));
+    let (names, fixed) = (names.join(", "), fixed.collect::<Vec<_>>().join(", "));
+    let four = "[\"zygomaticus_major\", \"zygomaticus_minor\", \"risorius\", \"levator_labii_superioris\"]";
+    let text = text.replace(&format!("face = {four}"), &format!("face = [{names}]"));
+    let text = text.replace(&format!("origin = {four}"), &format!("origin = [{fixed}]"));
+    let (head, tail) = text.split_once("[controls]").unwrap();
+    let text = format!("{head}\n[[probe]]{}", tail.split_once("[[probe]]").unwrap().1);
+    parse(&text, &[]).unwrap()
+}
+
+#[test]
+fn each_muscle_alone_draws_its_insertion_to_its_origin() {
+    let scene = all_muscles();
+    let built = build(&scene).unwrap();
+    let mesh = built.model.mesh();
+    let face = built_in_face();
+    let locator = Locator::new(mesh);
+    println!("muscle at 1 %: towards its origin mm, of mm, iterations");
+    for (k, muscle) in built.model.controls().iter().enumerate() {
+        let mut solver = Solver::new(&built.model, Settings::default()).unwrap();
+        let mut controls = vec![0.0; built.model.controls().len()];
+        controls[k] = 0.01;
+        let found = solver.equilibrium(&built.model.rest(), &Drive { controls, load: 1.0 });
+        let found = found.unwrap_or_else(|failure| panic!("{}: {}", muscle.name, failure.error));
+        let course = face.muscle(muscle.name.trim_end_matches(".L")).unwrap();
+        let at = |p: [f64; 3]| face.sheet.at(p[0], p[1], p[2]).position;
+        let (first, last) = (course.path[0], course.path[course.path.len() - 1]);
+        let moved = |x: Vector| {
+            mesh.interpolate(locator.locate(x).unwrap_or_else(|_| panic!("{x:?} is outside")), &found.state.u)
+        };
+        let u = moved(at(last));
+        let pull = normalised(subtract(at(first), at(last)));
+        let steps: usize = found.history.iter().map(|step| step.iterations.len()).sum();
+        println!("{:42} {:6.2} {:6.2} {steps:4} {u:.2?}", muscle.name, dot(u, pull), norm(u));
+        assert_eq!(found.negative_modes, Some(0), "{}", muscle.name);
+    }
 }
 
 #[test]

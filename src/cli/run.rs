@@ -191,7 +191,7 @@ fn write_page(folder: &RunFolder, flags: &Flags) -> Result<()> {
         Ok(_) => {}
         Err(error @ Error::Io { .. }) => return Err(error),
         Err(error) => flags.warn(&[Warning {
-            code: "O008",
+            code: "O009",
             message: format!("report.html could not be made: {error}"),
             place: None,
             help: Some(format!(

@@ -7,6 +7,7 @@ pub mod explain;
 mod likely;
 mod place;
 mod recording;
+mod registration;
 mod remedy;
 
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
 use recording::{encapsulation_name, list_topics};
+pub use registration::{Cause, Misregistration};
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -340,6 +342,28 @@ pub enum Error {
         /// First two bytes of its payload.
         id: [u8; 2],
     },
+    /// A marker file is not what its format asks for.
+    #[error("{} cannot be read: {at}: {message}", path.display())]
+    MarkerFile {
+        /// The file.
+        path: PathBuf,
+        /// Where: `line 7`, `byte 512`.
+        at: Box<str>,
+        /// What is wrong there.
+        message: Box<str>,
+    },
+    /// Neither the file nor the user says in which unit its positions are.
+    #[error(
+        "{} does not say in which unit its positions are{}",
+        path.display(),
+        if declared.is_empty() { String::new() } else { format!(" (it says: {declared})") }
+    )]
+    NoUnits {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        declared: Box<str>,
+    },
     /// A frame that is to be written has not one position per label.
     #[error("frame {frame} has {positions} positions for {labels} labels")]
     FrameShape {
@@ -362,8 +386,8 @@ pub enum Error {
         labels: usize,
         /// The unit in the problem file.
         declared: &'static str,
-        /// The unit that would explain the ratio.
-        likely: &'static str,
+        /// The unit that would explain the ratio, if one does.
+        likely: Option<&'static str>,
         /// The unit in the problem file.
         place: Box<Place>,
     },
@@ -405,6 +429,15 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
+    /// There are no markers to match, or fewer than three in the recording.
+    #[error("there is nothing to match: a [fit] with three [[marker]] and a recording that shows three are needed")]
+    NothingToMatch {
+        /// The problem file, or the recording in it.
+        place: Box<Place>,
+    },
+    /// The recording does not lie on the model.
+    #[error("{0}")]
+    Misregistered(Box<Misregistration>),
     // ---- G: geometry ----------------------------------------------------------------------------------
     /// The reference geometry of the host is inverted.
     #[error("the mesh is inverted: element {element} at xi ({:.3}, {:.3}, {:.3}) has det(dX/dxi) = {det:.3e} mm3", xi[0], xi[1], xi[2])]
@@ -717,6 +750,18 @@ pub enum Error {
         /// Its time, s.
         time_s: f64,
     },
+    /// A frame shows too few markers to say where the head is.
+    #[error(
+        "frame {frame} at {time_s:.3} s shows {markers} markers: where the head is takes three that do not lie on a line"
+    )]
+    HeadNotSeen {
+        /// Frame of the recording.
+        frame: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// Markers that it shows.
+        markers: usize,
+    },
     /// The optimiser stopped for a reason of its own.
     #[error("the optimiser stopped: {message}")]
     Optimiser {
@@ -733,6 +778,12 @@ pub enum Error {
         path: PathBuf,
         /// What the operating system said.
         source: std::io::Error,
+    },
+    /// The file asked for exists already.
+    #[error("{} exists already", path.display())]
+    FileExists {
+        /// The file.
+        path: PathBuf,
     },
     /// The folder asked for holds something already.
     #[error("the output folder {} is not empty: it holds {entries} files or folders", path.display())]
@@ -830,10 +881,12 @@ impl Error {
             Error::Undecodable { .. } => "M011",
             Error::UnsupportedEncapsulation { .. } => "M012",
             Error::FrameShape { .. } => "M013",
+            Error::MarkerFile { .. } => "M015",
             Error::UnitsLookWrong { .. } => "K001",
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
             Error::NoSuchFrame { .. } => "K004",
+            Error::Misregistered(wrong) => wrong.code(),
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -866,8 +919,12 @@ impl Error {
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
+            Error::HeadNotSeen { .. } => "F020",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
+            Error::FileExists { .. } => "O008",
+            Error::NoUnits { .. } => "M016",
+            Error::NothingToMatch { .. } => "K017",
             Error::NotARun { .. } => "O003",
             Error::NoShapes { .. } => "O004",
             Error::DamagedRun { .. } => "O005",
@@ -910,9 +967,11 @@ impl Error {
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
+            | Error::NothingToMatch { place }
             | Error::NoAxes { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
+            Error::Misregistered(wrong) => Some(&wrong.place),
             Error::Named(named) => Some(&named.1),
             _ => None,
         }

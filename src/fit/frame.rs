@@ -1,9 +1,11 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
+use super::free_head;
 use super::placement::Marker;
 use super::sensitivity::{Reuse, Sensitivity, sensitivities};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Solver};
+use crate::math::motion::Motion;
 use argmin::core::{Jacobian, Operator};
 use nalgebra::DMatrix;
 use std::cell::RefCell;
@@ -28,6 +30,8 @@ pub struct FrameProblem<'f, 'm> {
     sensitivity: Sensitivity,
     reuse: Reuse,
     drive: Drive,
+    /// Whether the head moves as it fits best.
+    free_head: bool,
     inner: RefCell<Inner<'f, 'm>>,
 }
 
@@ -39,6 +43,8 @@ struct Inner<'f, 'm> {
     directions: Option<Directions>,
     /// The equilibrium last found, if it is another one.
     trial: Option<Equilibrium>,
+    /// d(weighted residual)/dq at `base` with the head held, where that is free.
+    held_head: Option<DMatrix<f64>>,
 }
 
 /// dx/dq for the unknowns, one direction each.
@@ -80,8 +86,24 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
-        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None });
-        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, inner }
+        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None, held_head: None });
+        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, free_head: false, inner }
+    }
+
+    /// With a head that moves as it fits best.
+    pub fn with_free_head(self, free_head: bool) -> Self {
+        FrameProblem { free_head, ..self }
+    }
+
+    /// The derivative that was last asked for with the head held, where the head is free.
+    pub fn take_held_head(&self) -> Option<DMatrix<f64>> {
+        self.inner.borrow_mut().held_head.take()
+    }
+
+    /// The motion that takes the measured markers nearest to those of the model, where the head is free.
+    fn back(&self, model: &[[f64; 3]]) -> Motion {
+        let nearest = if self.free_head { free_head::nearest(model, &self.measured) } else { None };
+        nearest.unwrap_or(Motion::REST)
     }
 
     /// The equilibrium at which the derivative was last asked for, the last one that the iteration accepted, and the
@@ -104,11 +126,14 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
     fn residuals(&self, inner: &Inner<'_, '_>, at: &Equilibrium) -> Vec<f64> {
         let model = inner.solver.model();
         let x = model.current(&at.state);
-        let residual = |m: &Measured| {
-            let position = model.mesh().interpolate(self.markers[m.marker].point, &x);
-            std::array::from_fn::<f64, 3, _>(|i| m.weight * (position[i] - m.position[i]))
+        let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
+        let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
+        let back = self.back(&positions);
+        let residual = |(m, position): (&Measured, &[f64; 3])| {
+            let measured = back.place(m.position);
+            std::array::from_fn::<f64, 3, _>(|i| m.weight * (position[i] - measured[i]))
         };
-        self.measured.iter().flat_map(residual).collect()
+        self.measured.iter().zip(&positions).flat_map(residual).collect()
     }
 
     fn residuals_at(&self, q: &[f64]) -> Result<Vec<f64>> {
@@ -191,6 +216,13 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             }
         }
         inner.directions = Some(directions);
+        if self.free_head {
+            let x = model.current(&inner.base.state);
+            let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
+            let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
+            let reduced = free_head::project(&j, &self.back(&positions), &self.measured);
+            inner.held_head = Some(std::mem::replace(&mut j, reduced));
+        }
         Ok(j)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::covariance::{Bound, standard_deviations};
 use super::frame::{Directions, FrameProblem, Measured};
+use super::free_head::{self, FreeHead};
 use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
 use super::placement::{Marker, check_units, place};
 use super::sensitivity::{Reuse, Sensitivity};
@@ -10,7 +11,7 @@ use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
 use crate::model::{Control, Model};
-use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
+use crate::scene::{ControlValue, Curves, FitSpec, HeadSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
@@ -32,6 +33,8 @@ pub struct Fit<'m> {
     max_iterations: usize,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
     known_sd: bool,
+    /// Whether the motion of the head is estimated too.
+    free_head: bool,
     /// The equilibrium of the last frame, and the sensitivities there.
     last: Equilibrium,
     directions: Option<Directions>,
@@ -76,6 +79,8 @@ pub struct Estimate {
     /// d(weighted residual)/d(control) at the equilibrium: three rows for every marker that was measured, a column for every
     /// control that is sought.
     pub jacobian: DMatrix<f64>,
+    /// The motion of the head, where it is estimated; measured positions then have it taken out.
+    pub head: Option<FreeHead>,
 }
 
 impl<'m> Fit<'m> {
@@ -114,6 +119,7 @@ impl<'m> Fit<'m> {
         };
         Ok(Fit {
             known_sd: markers.iter().all(|m| m.sd.is_some()),
+            free_head: fit.registration.head == HeadSpec::Estimate,
             solver,
             markers,
             unknowns,
@@ -154,7 +160,8 @@ impl<'m> Fit<'m> {
     /// from the last good one.
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
         let shown = &recording.frames[frame];
-        let measured_mm: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
+        let mut measured_mm: Vec<Option<[f64; 3]>> =
+            self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
         let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
             let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
             position.map(|position| Measured { marker, position, weight })
@@ -163,20 +170,34 @@ impl<'m> Fit<'m> {
         if measured.is_empty() {
             return Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s });
         }
-        let residuals = 3 * measured.len();
-        let optimum = self.optimise(frame, shown.time_s, measured)?;
-        let (bounds, sd) = self.uncertainty(&optimum, residuals);
+        if self.free_head {
+            let mesh = self.solver.model().mesh();
+            let rest: Vec<[f64; 3]> = measured.iter().map(|m| mesh.position(self.markers[m.marker].point)).collect();
+            if free_head::nearest(&rest, &measured).is_none() {
+                return Err(Error::HeadNotSeen { frame, time_s: shown.time_s, markers: measured.len() });
+            }
+        }
+        let residuals = (3 * measured.len()).saturating_sub(if self.free_head { 6 } else { 0 });
+        let optimum = self.optimise(frame, shown.time_s, measured.clone())?;
+        let (bounds, sd, variance) = self.uncertainty(&optimum, residuals);
         (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
         let x = model.current(&self.last.state);
         let positions_mm: Vec<[f64; 3]> =
             self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
+        let shown: Vec<[f64; 3]> = measured.iter().map(|m| positions_mm[m.marker]).collect();
+        let back = if self.free_head { free_head::nearest(&shown, &measured) } else { None };
+        let head = back.zip(optimum.held_head).map(|(back, held)| {
+            measured_mm.iter_mut().flatten().for_each(|z| *z = back.place(*z));
+            let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
+            free_head::describe(&back, &measured, &held, &sought, variance)
+        });
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
         Ok(Estimate {
             frame,
-            time_s: shown.time_s,
+            time_s: recording.frames[frame].time_s,
             equilibrium: self.last.clone(),
             sd,
             bounds,
@@ -186,6 +207,7 @@ impl<'m> Fit<'m> {
             measured_mm,
             iterations: optimum.iterations,
             jacobian: optimum.jacobian,
+            head,
         })
     }
 
@@ -209,7 +231,8 @@ impl<'m> Fit<'m> {
             Drive { controls: held, load: 1.0 },
             self.last.clone(),
             self.directions.clone(),
-        );
+        )
+        .with_free_head(self.free_head);
         let most = self.max_iterations as u64;
         let solver = GaussNewton::new(ranges, self.tolerance);
         let solver = if self.reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
@@ -230,9 +253,10 @@ impl<'m> Fit<'m> {
         };
         match (reason, result.problem.take_problem(), result.state.take_jacobian()) {
             (None, Some(problem), Some(jacobian)) => {
+                let held_head = problem.take_held_head();
                 let (equilibrium, directions) = problem.into_equilibrium();
                 let cost = result.state.get_cost();
-                Ok(Optimum { equilibrium, directions, jacobian, cost, iterations })
+                Ok(Optimum { equilibrium, directions, jacobian, held_head, cost, iterations })
             }
             (reason, ..) => Err(Error::FitNotConverged {
                 frame,
@@ -244,9 +268,9 @@ impl<'m> Fit<'m> {
         }
     }
 
-    /// Where the controls lie, and their standard deviations: with the given deviations of the markers, or with what the
+    /// Where the controls lie, their standard deviations, and the variance of a weighted residual: with the given deviations of the markers, or with what the
     /// `residuals` of the frame estimate where not all are given.
-    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>) {
+    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
         let values = optimum.equilibrium.state.controls.iter();
         let bound = |(value, control): (&f64, &Control)| match value {
             value if *value <= control.lower => Bound::Lower,
@@ -265,7 +289,7 @@ impl<'m> Fit<'m> {
         for (k, unit) in self.unknowns.iter().zip(standard_deviations(&optimum.jacobian, &sought)) {
             sd[*k] = unit.zip(variance).map(|(unit, variance)| unit * variance.sqrt());
         }
-        (bounds, sd)
+        (bounds, sd, variance)
     }
 }
 
@@ -275,6 +299,8 @@ struct Optimum {
     directions: Option<Directions>,
     /// d(weighted residual)/d(unknown control).
     jacobian: DMatrix<f64>,
+    /// The same with the head held, where that is free.
+    held_head: Option<DMatrix<f64>>,
     /// 1/2 sum of squared weighted residuals.
     cost: f64,
     iterations: Vec<FitIteration>,

@@ -4,6 +4,7 @@
 
 use super::Scene;
 use super::spec::*;
+use super::units::Units;
 
 /// A number with the fewest digits that give the same bits again.
 fn number(value: f64) -> String {
@@ -95,8 +96,9 @@ impl Scene {
         if let Some(fit) = fit {
             fit_lines(fit, &mut lines);
         }
-        for MarkerSpec { name, position_mm, sd_mm, place: _ } in markers {
+        for MarkerSpec { name, label, position_mm, sd_mm, place: _ } in markers {
             lines.extend(["\n[[marker]]".into(), format!("name = {}", text(name))]);
+            lines.push(format!("label = {}", text(label)));
             lines.push(format!("position_mm = {}", numbers(position_mm)));
             lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
         }
@@ -313,6 +315,7 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             round(radius_mm, inside)
         ),
         SurfaceSpec::Reference(None) => "reference = true".into(),
+        SurfaceSpec::Arch(face) => format!("arch = {}", faces(face)),
         SurfaceSpec::Reference(Some(face)) => format!("reference = {}", faces(face)),
         SurfaceSpec::Faces { face, depth_mm } => {
             let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();
@@ -388,6 +391,8 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         sd_mm,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
+        registration:
+            RegistrationSpec { register, neutral, axes, head, head_place: _, register_place: _, neutral_place: _ },
         tolerance,
         max_iterations,
         finite_difference_step,
@@ -407,7 +412,11 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
     let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
-    lines.extend(["\n[fit]".into(), format!("markers = {}", path(markers)), format!("units = \"{units}\"")]);
+    lines.extend([
+        "\n[fit]".into(),
+        format!("markers = {}", path(markers)),
+        format!("units = \"{}\"", units.map_or("estimate", Units::name)),
+    ]);
     lines.extend(topic.as_ref().map(|topic| format!("topic = {}", text(topic))));
     lines.extend([
         format!("sensitivity = \"{sensitivity}\""),
@@ -421,8 +430,20 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     lines.extend([
         format!("max_marker_distance_mm = {}", number(*max_marker_distance_mm)),
         format!("frames = {{ first = {first}, {last}step = {step} }}"),
+        format!("register = \"{}\"", register.word()),
+        neutral.map_or("neutral = \"first\"".into(), |frame| format!("neutral = {frame}")),
+        format!("axes = [{}]", axes.map(|axis| text(axis.word())).join(", ")),
         format!("tolerance = {}", number(*tolerance)),
         format!("max_iterations = {max_iterations}"),
         format!("finite_difference_step = {}", number(*finite_difference_step)),
     ]);
+    let quoted = |labels: &[String]| labels.iter().map(|label| text(label)).collect::<Vec<_>>().join(", ");
+    match head {
+        HeadSpec::None => {}
+        HeadSpec::BoneMarkers(labels) => {
+            lines.extend(["\n[fit.head]".into(), format!("bone_markers = [{}]", quoted(labels))]);
+        }
+        HeadSpec::Estimate => lines.extend(["\n[fit.head]".into(), "estimate = true".into()]),
+        HeadSpec::PoseTopic(topic) => lines.extend(["\n[fit.head]".into(), format!("pose_topic = {}", text(topic))]),
+    }
 }

@@ -19,6 +19,7 @@ mod lock;
 mod nearest;
 mod overrides;
 mod references;
+mod registration;
 mod spec;
 mod study;
 mod tree;

@@ -26,6 +26,8 @@ pub struct FittedFrame {
 pub struct FitSummary<'a> {
     /// Name of the problem.
     pub name: &'a str,
+    /// How the recording was brought to the model: whole lines, or nothing.
+    pub recording: &'a str,
     /// Names of the controls, those of bones with their unit.
     pub controls: &'a [&'a str],
     /// Whether some of them are of bones.
@@ -65,6 +67,9 @@ impl fmt::Display for FitSummary<'_> {
             frames => self.of_clip(frames, out)?,
         }
         self.of_markers(out)?;
+        if !self.recording.is_empty() {
+            write!(out, "\n{}", self.recording)?;
+        }
         write!(out, "{}", self.mesh_errors)?;
         let folder = self.folder;
         writeln!(out, "\nnext: shapes and residuals in {folder}/view/result.pvd and markers.pvd (ParaView)")?;

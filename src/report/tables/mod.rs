@@ -11,9 +11,11 @@ mod cost;
 mod energies;
 mod estimate;
 mod fit;
+mod head;
 mod markers;
 mod muscles;
 mod probes;
+mod registration;
 
 pub use activations::ActivationTable;
 pub use bones::BoneTable;
@@ -23,9 +25,11 @@ pub use cost::write_cost;
 pub use energies::EnergyTable;
 pub use estimate::EstimateTable;
 pub use fit::FitTable;
+pub use head::{FreeHeadRow, HeadRow, write_free_head, write_head};
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
 pub use probes::ProbeTable;
+pub use registration::{Placement, write_registration};
 
 use super::frame::Frame;
 use super::run_folder::failed;
