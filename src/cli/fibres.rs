@@ -34,7 +34,7 @@ pub(super) fn run(problem: &FibreProblem, path: &Path, flags: &Flags) -> Result<
         tally.frames_ok = 1;
         Ok(tally)
     });
-    finish(&run, None, &Work::default(), outcome, flags.strict)
+    finish(&run, None, &Work::default(), outcome, flags)
 }
 
 /// Everything but the fit.

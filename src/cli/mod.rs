@@ -19,6 +19,7 @@ mod noticed;
 mod prepare;
 mod problem;
 mod progress;
+mod report;
 mod run;
 mod study;
 mod terminal;
@@ -89,6 +90,11 @@ enum Command {
         /// The frame for formats of one frame [default: the one that moved most]
         #[arg(long, value_name = "N")]
         frame: Option<usize>,
+    },
+    /// Write a finished run as one page for a browser: report.html in its folder
+    Report {
+        /// The folder of a run
+        run: PathBuf,
     },
     /// What the code of a message means, and what to do; without one, a list of all
     Explain {
@@ -304,6 +310,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         }
         Some(Command::Markers { command: Markers::Match { problem } }) => markers::match_labels(problem, &cli.flags),
         Some(Command::Export { run, to, frame }) => export::export(run, to, *frame, &cli.flags),
+        Some(Command::Report { run }) => report::report(run),
         Some(Command::Explain { code }) => explain::explain(code),
         Some(Command::Completions { shell }) => completions::completions(*shell),
     }

@@ -10,6 +10,7 @@ use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
 use crate::model::Model;
+use crate::report::html;
 use crate::report::manifest::Input;
 use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
@@ -109,7 +110,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
 
     let mut work = Work::default();
     let outcome = task(&source, &prepared, &run, flags, &mut work);
-    finish(&run, Some(&built.model), &work, outcome, flags.strict)
+    finish(&run, Some(&built.model), &work, outcome, flags)
 }
 
 fn task(source: &Source, prepared: &Prepared, run: &Run, flags: &Flags, work: &mut Work) -> Result<Tally> {
@@ -141,7 +142,7 @@ pub(super) fn finish(
     model: Option<&Model>,
     work: &Work,
     outcome: Result<Tally>,
-    strict: bool,
+    flags: &Flags,
 ) -> Result<Ending> {
     run.manifest(model, work)?;
     match outcome {
@@ -149,7 +150,7 @@ pub(super) fn finish(
             let Tally { frames_ok, failed, interrupted, warnings } = tally;
             let ending = match failed.len() {
                 _ if interrupted => Ending::Interrupted,
-                0 if !warnings.is_empty() && strict => Ending::Warned,
+                0 if !warnings.is_empty() && flags.strict => Ending::Warned,
                 0 => Ending::Ok,
                 _ => Ending::NotConverged,
             };
@@ -171,6 +172,9 @@ pub(super) fn finish(
                 false => Status::finished(frames_ok, failed),
             };
             Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
+            if frames_ok > 0 {
+                write_page(&run.folder, flags)?;
+            }
             Ok(ending)
         }
         Err(error) => {
@@ -178,6 +182,25 @@ pub(super) fn finish(
             Err(error)
         }
     }
+}
+
+/// Writes `report.html`. What the run found is on disk already: a page that cannot be made is no reason to fail.
+fn write_page(folder: &RunFolder, flags: &Flags) -> Result<()> {
+    match html::write(folder.path()) {
+        Ok(path) if !flags.quiet => tell(&format!("all on one page: {}\n", path.display())),
+        Ok(_) => {}
+        Err(error @ Error::Io { .. }) => return Err(error),
+        Err(error) => flags.warn(&[Warning {
+            code: "O009",
+            message: format!("report.html could not be made: {error}"),
+            place: None,
+            help: Some(format!(
+                "everything else is there; try again with: risorius report {}",
+                folder.path().display()
+            )),
+        }]),
+    }
+    Ok(())
 }
 
 /// Files that the scene names and that are read from disk.

@@ -4,6 +4,7 @@
 //! runs/<name>-0001/
 //!   status.json, manifest.json          how it stands, what was run on what
 //!   summary.txt                         the page that the terminal showed
+//!   report.html                         the same and more for a browser
 //!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
 //!   view/result.pvd, muscles.pvd, contact.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
 //!   view/result_0000.exf, ...           the same shapes for Zinc and cmgui
@@ -16,6 +17,7 @@ pub mod exf;
 pub mod export;
 pub mod fibres;
 pub mod frame;
+pub mod html;
 pub mod machine;
 pub mod manifest;
 pub mod playback;

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 const SUB_FOLDERS: [&str; 3] = ["tables", "view", "view/linear"];
 /// Sub-folders that a run fills and a later one in the same place replaces.
 const REPLACED: [&str; 3] = ["tables", "view", "state"];
+/// Files of a run that one of another task, or one that fails, would not replace.
+const REMOVED: [&str; 3] = ["report.html", "study.md", "fibres.exf"];
 
 /// A folder that exists, holds the sub-folders of a run, and belongs to this run alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -54,6 +56,12 @@ impl RunFolder {
                     Err(error) if error.kind() != ErrorKind::NotFound => {
                         return Err(failed("remove", &folder)(error));
                     }
+                    _ => {}
+                }
+            }
+            for file in REMOVED.map(|name| path.join(name)) {
+                match fs::remove_file(&file) {
+                    Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed("remove", &file)(error)),
                     _ => {}
                 }
             }
