@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 const STYLE: &str = include_str!("style.css");
+/// What a browser may do with a page: run what stands in it, ask for nothing.
+const POLICY: &str = include_str!("policy.html");
 
 /// A page that grows section by section.
 #[derive(Debug, Default)]
@@ -38,7 +40,7 @@ impl Page {
         let links = self.contents.iter().map(|(id, heading)| format!("<a href=\"#{id}\">{}</a>", escape(heading)));
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:\">\n\
+             {POLICY}\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n\
              <title>{}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<p class=\"only\">Research use only, not a diagnosis.</p>\n{}\
              <nav>{}</nav>\n{}<footer>Research use only, not a diagnosis. Written by risorius {}.</footer>\n{}</body>\n</html>\n",
