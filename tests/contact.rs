@@ -9,7 +9,9 @@ use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
 use risorius::mesh::surface::Surface;
 use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty, Smooth};
-use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Gap, Patches, Plane, RigidSurface, Sphere};
+use risorius::term::contact::surface::{
+    Arch, Capsule, Cylinder, FreeSide, Gap, Patches, Plane, RigidSurface, Sphere,
+};
 
 /// A wavy sheet: the top of a block with all its parameters moved.
 fn sheet() -> Mesh {
@@ -45,6 +47,10 @@ fn surfaces() -> Vec<(Box<dyn RigidSurface>, Vec<Vector>)> {
         let over = (0..40).map(|_| [random.between(3.0, 27.0), random.between(3.0, 17.0), random.between(8.0, 12.0)]);
         all.push((Box::new(patches), over.collect()));
     }
+    let mesh = sheet();
+    let mut random = Random::new(57);
+    let under = (0..40).map(|_| [random.between(3.0, 27.0), random.between(3.0, 17.0), random.between(-5.0, 3.0)]);
+    all.push((Box::new(Arch::new(&mesh, &mesh.named_faces["xi3=0"])), under.collect()));
     all
 }
 

@@ -11,6 +11,7 @@ use risorius::mesh::location::Locator;
 use risorius::mesh::{MaterialPoint, Mesh, position_and_jacobian};
 use risorius::model::build::build;
 use risorius::scene::{GeometrySpec, Scene, built_in_face};
+use risorius::term::contact::surface::{Arch, RigidSurface};
 use risorius::term::muscle::Muscle;
 use std::collections::HashMap;
 use std::path::Path;
@@ -481,6 +482,28 @@ fn a_muscle_pulls_the_corner_of_the_mouth_to_its_origin() {
     println!("the corner of the mouth moves by {moved:?} mm");
     assert!(norm(moved) > 0.2 && dot(moved, pull) > 0.8 * norm(moved), "{moved:?}, pulled along {pull:?}");
     assert_eq!(found.negative_modes, Some(0));
+}
+
+/// Teeth and jaws lie close behind the lips and touch them nowhere; half a face and finer meshes have the same ones.
+#[test]
+fn the_arch_is_close_behind_the_lips() {
+    let arch = |mesh: &Mesh| Arch::new(mesh, &mesh.named_faces["deep.perioral"]);
+    let [whole, half, halved] = [WHOLE, HALF, HALVED].map(mesh);
+    let surfaces = [&whole, &half, &halved].map(arch);
+    let (mut nearest, mut farthest, mut sum, mut count) = (f64::INFINITY, 0.0_f64, 0.0, 0.0);
+    for face in &whole.named_faces["deep.perioral"] {
+        for [s, t] in gauss().into_iter().flat_map(|s| gauss().map(|t| [s, t])) {
+            let x = whole.position(MaterialPoint { element: face.element, xi: face.side.lift([s, t]) });
+            let gaps =
+                surfaces.each_ref().map(|arch| arch.gap(x).unwrap_or_else(|| panic!("beyond it at {x:?}")).value);
+            assert!((gaps[1] - gaps[0]).abs() < 1e-9, "half a face: {gaps:?} at {x:?}");
+            assert!((gaps[2] - gaps[0]).abs() < 0.1, "halved elements: {gaps:?} at {x:?}");
+            (nearest, farthest) = (nearest.min(gaps[0]), farthest.max(gaps[0]));
+            (sum, count) = (sum + gaps[0], count + 1.0);
+        }
+    }
+    println!("the arch is {nearest:.3} to {farthest:.2} mm behind the lips, {:.2} mm in the mean", sum / count);
+    assert!(nearest > 0.0 && farthest < 4.0, "{nearest} to {farthest}");
 }
 
 /// The face as in problems/smile with all muscles of the left side.

@@ -20,7 +20,7 @@ use risorius::model::{Control, Evaluation, Ingredients, Model, State, Workspace}
 use risorius::term::bone::{Bone, Hinge, Slide};
 use risorius::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty};
 use risorius::term::contact::mutual::{Between, Manner, Mutual};
-use risorius::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
+use risorius::term::contact::surface::{Arch, Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use risorius::term::contact::{Contact, Interface};
 use risorius::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use risorius::term::muscle::{Activation, Muscle};
@@ -194,7 +194,7 @@ type MakeLaw = fn() -> Box<dyn ContactLaw>;
 /// Every surface with every law: (name, what it allows, surface, law, whether it relaxes).
 fn contacts() -> Vec<(String, Allows, MakeSurface, MakeLaw, bool)> {
     const FREE: FreeSide = FreeSide::Outside;
-    let surfaces: [(&str, MakeSurface); 5] = [
+    let surfaces: [(&str, MakeSurface); 6] = [
         ("plane", |_| Box::new(Plane { through: [10.0, 10.0, 0.7], normal: normalised([0.1, -0.1, 1.0]) })),
         ("sphere", |_| Box::new(Sphere { centre: [10.0, 9.0, -18.0], radius: 19.0, free: FREE })),
         ("cylinder", |_| {
@@ -205,6 +205,7 @@ fn contacts() -> Vec<(String, Allows, MakeSurface, MakeLaw, bool)> {
             Box::new(Capsule { ends: [[7.0, 8.0, -20.0], [14.0, 9.0, -19.0]], radius: 21.0, free: FREE })
         }),
         ("reference", |mesh| Box::new(Patches::new(mesh, &mesh.named_faces["xi3=0"], FreeSide::Inside))),
+        ("arch", |mesh| Box::new(Arch::new(mesh, &mesh.named_faces["xi3=0"]))),
     ];
     let laws: [(&str, MakeLaw); 2] = [
         ("penalty", || Box::new(Penalty { stiffness: 2.0 })),

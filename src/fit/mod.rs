@@ -5,7 +5,8 @@
 //! m_k(q) is the place of marker k at the equilibrium of the forward model; nothing of this is known to the forward.
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
-//! ([`sensitivity`]). Before the first, the recording is brought to the model ([`registration`]). Frames follow each other warm ([`sequence`]); [`covariance`] says how far an answer can be believed.
+//! ([`sensitivity`]). Before the first, the recording is brought to the model ([`registration`]). Frames follow each other
+//! warm ([`sequence`]); [`covariance`] says how far an answer can be believed.
 
 pub mod bias;
 pub mod bounded_step;

@@ -268,8 +268,8 @@ impl<'m> Fit<'m> {
         }
     }
 
-    /// Where the controls lie, their standard deviations, and the variance of a weighted residual: with the given deviations of the markers, or with what the
-    /// `residuals` of the frame estimate where not all are given.
+    /// Where the controls lie, their standard deviations, and the variance of a weighted residual: with the given deviations of
+    /// the markers, or with what the `residuals` of the frame estimate where not all are given.
     fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
         let values = optimum.equilibrium.state.controls.iter();
         let bound = |(value, control): (&f64, &Control)| match value {

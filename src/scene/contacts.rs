@@ -8,11 +8,12 @@ use super::tree::Value;
 type Contacts = Option<Vec<ContactSpec>>;
 
 /// All slidings and all contacts of a file.
-pub(super) fn both(file: &mut Table) -> (Contacts, Contacts) {
-    let slidings = numbered(file, "sliding", &[("penalty", penalty), ("augmented", augmented)]);
+pub(super) fn both(file: &mut Table, host: Option<&MeshSpec>) -> (Contacts, Contacts) {
+    let slidings = numbered(file, "sliding", host, &[("penalty", penalty), ("augmented", augmented)]);
     let contacts = numbered(
         file,
         "contact",
+        host,
         &[("penalty", penalty), ("smooth", smooth), ("augmented", augmented), ("barrier", barrier)],
     );
     (slidings, contacts)
@@ -21,15 +22,27 @@ pub(super) fn both(file: &mut Table) -> (Contacts, Contacts) {
 type LawReader<'a> = (&'static str, Reader<'a, ContactLawSpec>);
 
 /// The tables `[[kind]]` of contacts; one without a name is called by its kind and number.
-fn numbered<'a>(file: &mut Table<'a>, kind: &'static str, laws: &[LawReader<'a>]) -> Option<Vec<ContactSpec>> {
+fn numbered<'a>(
+    file: &mut Table<'a>,
+    kind: &'static str,
+    host: Option<&MeshSpec>,
+    laws: &[LawReader<'a>],
+) -> Option<Vec<ContactSpec>> {
     let mut number = 0;
     file.tables(kind, |table| {
         number += 1;
-        contact(table, kind, &format!("{kind}-{number}"), laws)
+        contact(table, kind, &format!("{kind}-{number}"), host, laws)
     })
 }
 
-fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[LawReader<'a>]) -> Option<ContactSpec> {
+fn contact<'a>(
+    table: &mut Table<'a>,
+    kind: &str,
+    default_name: &str,
+    host: Option<&MeshSpec>,
+    laws: &[LawReader<'a>],
+) -> Option<ContactSpec> {
+    let on_face = host.is_none_or(|host| matches!(host.geometry, GeometrySpec::Face(_)));
     let name = table.or("name", default_name.to_owned(), |item| item.name());
     let face = face(table);
     let surface =
@@ -38,6 +51,10 @@ fn contact<'a>(table: &mut Table<'a>, kind: &str, default_name: &str, laws: &[La
                 SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } if kind == "sliding" => {
                     item.out_of_range("a face that yields", "a rigid surface for sliding; [[contact]] can meet faces")
                 }
+                SurfaceSpec::Arch(_) if !on_face => item.out_of_range(
+                    &item.node.to_toml(),
+                    "another surface: the mesh is no face, whose x runs across and z forwards",
+                ),
                 surface => Some(surface),
             }
         });

@@ -33,7 +33,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         let muscles = file.tables("muscle", |table| muscle(table, references, mesh.as_ref()));
         let bones = file.tables("bone", bones::bone);
         let supports = file.tables("support", support);
-        let (slidings, contacts) = contacts::both(file);
+        let (slidings, contacts) = contacts::both(file, mesh.as_ref());
         let loads = file.tables("load", load);
         let attachments = file.tables("attachment", |table| bones::attachment(table, mesh.as_ref()));
         let controls =

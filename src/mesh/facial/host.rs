@@ -279,7 +279,7 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
     all
 }
 
-/// Rows and columns (from the midline) of the tissue on bone and cartilage of the nose.
+/// Rows and columns (from the midline) of the tissue on bone and cartilage of the nose, with the base of the upper lip.
 const NOSE: (std::ops::Range<usize>, usize) = (8..14, 3);
-/// Rows and columns (from the midline) of the tissue that lies on teeth and jaws: from the chin to the base of the nose.
+/// Rows and columns (from the midline) of the tissue that lies on teeth and jaws: from the chin to below the base of the nose.
 const PERIORAL: (std::ops::Range<usize>, usize) = (2..8, 5);

@@ -35,9 +35,12 @@ pub(super) fn paragraph(run: &Playback, manifest: &Value) -> String {
     );
     if !scene.muscles.is_empty() {
         text += &format!(
-            " {} were embedded with meshes of their own (Wu et al. 2013); their fibres follow the force-stretch relation of Blemker \
-             et al. 2005.",
-            if scene.muscles.len() == 1 { "A muscle".into() } else { format!("The {} muscles", scene.muscles.len()) }
+            " {} (Wu et al. 2013); fibres follow the force-stretch relation of Blemker et al. 2005.",
+            if scene.muscles.len() == 1 {
+                "A muscle was embedded with a mesh of its own".into()
+            } else {
+                format!("{} muscles were embedded with meshes of their own", scene.muscles.len())
+            }
         );
     }
     match &scene.fit {
@@ -50,12 +53,12 @@ pub(super) fn paragraph(run: &Playback, manifest: &Value) -> String {
                 .sd_mm
                 .map_or("estimated from the residuals".into(), |sd| format!("taken as {sd} mm per coordinate"));
             text += &format!(
-                " {} were found from {} surface markers in {} frames by bounded Gauss-Newton steps with {how}; activations were \
-                 kept between 0 and 1. The noise of the markers was {noise}; intervals follow from it to first order.",
+                " {} found from {} surface markers in {} frames by bounded Gauss-Newton steps with {how}; activations were kept \
+                 between 0 and 1. The noise of the markers was {noise}; intervals follow from it to first order.",
                 if fit.unknowns.len() == 1 {
-                    "One control".into()
+                    "One control was".into()
                 } else {
-                    format!("The {} controls", fit.unknowns.len())
+                    format!("The {} controls were", fit.unknowns.len())
                 },
                 run.markers.len(),
                 run.frames.len()
