@@ -8,6 +8,7 @@ mod others;
 #[path = "recordings/writer.rs"]
 mod writer;
 
+use common::BEAM_FIT;
 use risorius::fit::registration::{Registration, register};
 use risorius::fit::{Estimate, Fit, placement, recording};
 use risorius::markers::{Clock, ReadOptions, read_poses_bytes};
@@ -66,30 +67,7 @@ fn head(frame: usize) -> Motion {
 }
 
 fn problem(fit: &str) -> String {
-    let mut text = String::from(
-        r#"
-[task]
-kind = "fit"
-[mesh]
-block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
-[tissue]
-mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
-kappa_kpa = 10.0
-gauss = 4
-[[muscle]]
-name = "top"
-block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
-fibre_angles_deg = [0, 0, 0]
-blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
-[[muscle]]
-name = "bottom"
-block = { origin_mm = [4.5, 2.0, 1.8], size_mm = [50, 16, 4], elements = [5, 2, 1] }
-fibre_angles_deg = [36, 0, 0]
-blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
-[[support]]
-clamp = { face = "xi1=0" }
-"#,
-    );
+    let mut text = String::from(BEAM_FIT);
     for (k, [x, y, z]) in MARKERS.iter().enumerate() {
         writeln!(text, "[[marker]]\nname = \"B{k:02}\"\nposition_mm = [{x}, {y}, {z}]").unwrap();
     }
@@ -288,18 +266,24 @@ fn poses_are_interpolated_between_neighbours_only() {
     assert!(error.code() == "M011" && error.to_string().contains("length 1.1"), "{error}");
 }
 
-/// A run says how the head moved, on its page and in a table of its own.
-#[test]
-fn a_run_tells_how_the_head_moved() {
+/// Runs the fit of frame 15 of a recording that stands elsewhere: its folder, and its page.
+fn run_of_frame_15(fit: &str) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let topic = markers(&elsewhere(), |_| [0.0; 3], |_, _| false);
     std::fs::write(folder.path().join("beam.mcap"), file(container("zstd"), &[topic])).unwrap();
-    let fit = format!("register = \"rigid\"\nframes = {{ first = 15, last = 15 }}\n{BONES}");
+    let fit = format!("register = \"rigid\"\nframes = {{ first = 15, last = 15 }}\n{fit}");
     std::fs::write(folder.path().join("head.toml"), problem(&fit)).unwrap();
     let mut command = assert_cmd::Command::cargo_bin("risorius").unwrap();
     let output = command.current_dir(&folder).args(["run", "head.toml", "--out", "run"]).output().unwrap();
     let page = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    (folder, page)
+}
+
+/// A run says how the head moved, on its page and in a table of its own.
+#[test]
+fn a_run_tells_how_the_head_moved() {
+    let (folder, page) = run_of_frame_15(BONES);
     for words in
         ["head: taken out from 5 bone markers; it turns by up to 15.00 degrees (frame 15)", "registration: rigid"]
     {
@@ -392,15 +376,7 @@ fn deviations_hold_the_confounding_of_head_and_activations() {
 
 #[test]
 fn a_run_tells_how_sure_an_estimated_head_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let topic = markers(&elsewhere(), |_| [0.0; 3], |_, _| false);
-    std::fs::write(folder.path().join("beam.mcap"), file(container("zstd"), &[topic])).unwrap();
-    let fit = format!("register = \"rigid\"\nframes = {{ first = 15, last = 15 }}\nsd_mm = 0.2\n{FREE}");
-    std::fs::write(folder.path().join("head.toml"), problem(&fit)).unwrap();
-    let mut command = assert_cmd::Command::cargo_bin("risorius").unwrap();
-    let output = command.current_dir(&folder).args(["run", "head.toml", "--out", "run"]).output().unwrap();
-    let page = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let (folder, page) = run_of_frame_15(&format!("sd_mm = 0.2\n{FREE}"));
     for words in
         ["head: estimated with the controls; it turns by up to 15.0", "times that with a known head", "  top: its sd"]
     {

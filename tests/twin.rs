@@ -5,6 +5,9 @@
 //! slabs of 50 x 16 x 4 mm (5 x 2 x 1 elements, 3 x 3 x 3 points) at (4.5, 2, 14.2), fibre angle 0, and at (4.5, 2, 1.8),
 //! 36 degrees; `truth[frame]` are the activations (top, bottom), `positions_mm[frame][marker]` the markers, without noise.
 
+mod common;
+
+use common::BEAM_FIT;
 use risorius::fit::covariance::Bound;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::fit::{Estimate, Fit};
@@ -44,30 +47,7 @@ fn twin() -> Twin {
 }
 
 fn problem(extra: &str) -> String {
-    let mut text = String::from(
-        r#"
-[task]
-kind = "fit"
-[mesh]
-block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
-[tissue]
-mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
-kappa_kpa = 10.0
-gauss = 4
-[[muscle]]
-name = "top"
-block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
-fibre_angles_deg = [0, 0, 0]
-blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
-[[muscle]]
-name = "bottom"
-block = { origin_mm = [4.5, 2.0, 1.8], size_mm = [50, 16, 4], elements = [5, 2, 1] }
-fibre_angles_deg = [36, 0, 0]
-blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
-[[support]]
-clamp = { face = "xi1=0" }
-"#,
-    );
+    let mut text = String::from(BEAM_FIT);
     for (name, [x, y, z]) in MARKERS {
         writeln!(text, "[[marker]]\nname = \"{name}\"\nposition_mm = [{x}, {y}, {z}]").expect("text");
     }

@@ -6,6 +6,30 @@ use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
 use risorius::mesh::element::Element;
 
+/// The start of a fit: a beam with two muscles, one along it and one oblique; markers and `[fit]` are to follow.
+pub const BEAM_FIT: &str = r#"
+[task]
+kind = "fit"
+[mesh]
+block = { origin_mm = [0, 0, 0], size_mm = [60, 20, 20], elements = [6, 2, 2] }
+[tissue]
+mooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }
+kappa_kpa = 10.0
+gauss = 4
+[[muscle]]
+name = "top"
+block = { origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], elements = [5, 2, 1] }
+fibre_angles_deg = [0, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[muscle]]
+name = "bottom"
+block = { origin_mm = [4.5, 2.0, 1.8], size_mm = [50, 16, 4], elements = [5, 2, 1] }
+fibre_angles_deg = [36, 0, 0]
+blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
+[[support]]
+clamp = { face = "xi1=0" }
+"#;
+
 /// A uniform random sequence in [-1, 1), the same on every machine.
 pub struct Random(u64);
 

@@ -30,7 +30,12 @@ impl Sheet {
     /// # Errors
     /// [`Error::DamagedRun`].
     pub fn parse(path: PathBuf, text: &str) -> Result<Sheet> {
-        let mut rows = records(text);
+        let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+        let rows: std::result::Result<Vec<Vec<String>>, _> = reader.deserialize().collect();
+        let mut rows = match rows {
+            Ok(rows) => rows,
+            Err(error) => return Err(Error::DamagedRun { path, message: error.to_string().into() }),
+        };
         let columns = if rows.is_empty() { Vec::new() } else { rows.remove(0) };
         if let Some(at) = rows.iter().position(|row| row.len() != columns.len()) {
             let message = format!("row {} has {} cells, the header has {}", at + 2, rows[at].len(), columns.len());
@@ -103,28 +108,4 @@ impl Sheet {
         let message = format!("row {}: `{text}` in column `{name}` is no number", row + 2).into();
         Error::DamagedRun { path: self.path.clone(), message }
     }
-}
-
-/// Records of RFC 4180: cells in quotes may hold commas, quotes and line ends.
-fn records(text: &str) -> Vec<Vec<String>> {
-    let (mut rows, mut row, mut cell, mut quoted) = (Vec::new(), Vec::new(), String::new(), false);
-    let mut characters = text.chars().peekable();
-    while let Some(character) = characters.next() {
-        match character {
-            '"' if quoted && characters.peek() == Some(&'"') => cell.extend(characters.next()),
-            '"' => quoted = !quoted,
-            ',' if !quoted => row.push(std::mem::take(&mut cell)),
-            '\n' if !quoted => {
-                row.push(std::mem::take(&mut cell));
-                rows.push(std::mem::take(&mut row));
-            }
-            '\r' if !quoted => {}
-            other => cell.push(other),
-        }
-    }
-    if !row.is_empty() || !cell.is_empty() {
-        row.push(cell);
-        rows.push(row);
-    }
-    rows
 }
