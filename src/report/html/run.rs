@@ -16,7 +16,7 @@ pub(super) fn page(run: &Playback) -> Result<String> {
     let scene = &run.scene;
     let fitted = !run.markers.is_empty();
     let what = if fitted { "Muscle activations found from surface markers" } else { "Shapes for given activations" };
-    let mut page = Page::new(&scene.name, &format!("{what}; {} frames, {:.2} s.", run.frames.len(), duration(run)));
+    let mut page = Page::new(&scene.name, &format!("{what}; {}.", extent(run)));
     standing(&mut page, &run.status);
     page.section("At a glance", &glance(run));
     if let Some(section) = viewer::section(run) {
@@ -76,8 +76,13 @@ pub(super) fn standing(page: &mut Page, status: &Status) {
     }
 }
 
-fn duration(run: &Playback) -> f64 {
-    run.frames.last().zip(run.frames.first()).map_or(0.0, |(last, first)| last.time_s - first.time_s)
+/// How many frames over which time.
+fn extent(run: &Playback) -> String {
+    match &run.frames[..] {
+        [] => "no frame converged".into(),
+        [frame] => format!("one frame, at {:.2} s", frame.time_s),
+        [first, .., last] => format!("{} frames, {:.2} s", run.frames.len(), last.time_s - first.time_s),
+    }
 }
 
 /// The strongest of each control, and how well the markers are met.
@@ -187,7 +192,10 @@ fn effort(run: &Playback) -> Result<String> {
         let line = |values: Vec<Option<f64>>| Line { values, ..Line::default() };
         let (title, iterations) = match Sheet::find(&run.folder.join("tables"), "fit")? {
             Some(sheet) => ("Gauss-Newton steps of the fit", steps(run, &sheet)?),
-            None => ("Newton iterations", run.effort.iter().map(|effort| Some(effort.iterations as f64)).collect()),
+            None => (
+                "Newton iterations of the steps that succeeded",
+                run.effort.iter().map(|effort| Some(effort.iterations as f64)).collect(),
+            ),
         };
         let ratio =
             run.effort.iter().map(|e| Some((e.residual_mn / e.required_mn).log10()).filter(|r| r.is_finite()));
