@@ -130,7 +130,7 @@ fn a_run_without_shapes_and_markers_has_a_page_too() {
     assert_eq!(exit, 0, "{stderr}");
     let page = fs::read_to_string(folder.path().join("run/report.html")).unwrap();
     stands_alone(&page);
-    assert!(page.contains("Shapes for given activations; 1 frames") && !page.contains("viewer-data"));
+    assert!(page.contains("Shapes for given activations; one frame, at") && !page.contains("viewer-data"));
     assert!(!page.contains("Left against right</h2>") && !page.contains("cannot tell</h2>"));
 }
 
