@@ -7,6 +7,7 @@ use super::noticed::noticed;
 use super::prepare::{Clip, Prepared};
 use super::progress::Meter;
 use super::run::{Run, Tally};
+use super::telling::Telling;
 use super::terminal::print;
 use crate::cli::diagnostics::render_error;
 use crate::error::Result;
@@ -37,6 +38,7 @@ pub(super) fn fit(
     let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
     let mut estimates = Estimates::new(prepared, settings(scene), placed)?;
+    let mut telling = Telling::new(model.mesh(), &fit, labels.clone());
     let mut meter = Meter::new(flags, frames.len());
     let mut tally = Tally::default();
     let mut fitted = Vec::new();
@@ -62,8 +64,11 @@ pub(super) fn fit(
                     fit.work().linear.factorisations - before
                 ));
                 tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
-                let warning = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
-                tally.warn(frame, warning.into_iter().collect(), &mut meter, flags);
+                let estimated = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
+                tally.warn(frame, estimated.warning.into_iter().collect(), &mut meter, flags);
+                let biases: Vec<_> =
+                    estimated.error.iter().flat_map(|e| e.biases.iter().map(|(_, bias)| *bias)).collect();
+                telling.frame(frame, &estimate, &fit, &biases, &mut record)?;
                 fitted.push(FittedFrame {
                     frame,
                     values: estimate.equilibrium.state.controls.clone(),
@@ -80,6 +85,10 @@ pub(super) fn fit(
         run.write_running(&tally)?;
     }
     meter.finish();
+    if let Some((frame, warning)) = telling.warning() {
+        tally.warn(frame, vec![warning], &mut meter, flags);
+    }
+    record.told_of_clip(&telling.clip, &labels)?;
     *work = fit.work();
     record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
     let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
@@ -91,6 +100,8 @@ pub(super) fn fit(
         frames_failed: tally.failed.len(),
         errors: &errors,
         mesh_errors: &estimates.errors,
+        told: &telling.clip,
+        markers: &names,
         iterations: work.iterations,
         seconds: run.start.elapsed().as_secs_f64(),
         folder: &run.folder.path().display().to_string(),

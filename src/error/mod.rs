@@ -716,6 +716,12 @@ pub enum Error {
         /// Its time, s.
         time_s: f64,
     },
+    /// Advice on markers was asked for where none are fitted.
+    #[error("{}: this is no fit: there are no markers to add to", path.display())]
+    NotAFit {
+        /// The problem.
+        path: PathBuf,
+    },
     /// The optimiser stopped for a reason of its own.
     #[error("the optimiser stopped: {message}")]
     Optimiser {
@@ -829,10 +835,11 @@ impl Error {
             Error::StepNotSolved { .. } => "F001",
             Error::Axes { .. } => "M014",
             Error::NoAxes { .. } => "K005",
-            Error::FibreSystem { .. } => "F005",
+            Error::FibreSystem { .. } => "F010",
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
+            Error::NotAFit { .. } => "F011",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
         }

@@ -1,9 +1,10 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
 use super::placement::Marker;
-use super::sensitivity::{Reuse, Sensitivity, sensitivities};
+use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Solver};
+use crate::mesh::MaterialPoint;
 use argmin::core::{Jacobian, Operator};
 use nalgebra::DMatrix;
 use std::cell::RefCell;
@@ -50,6 +51,11 @@ pub struct Directions {
 }
 
 impl Directions {
+    /// One direction in the unknowns of the balance per control.
+    pub fn columns(&self) -> &[Vec<f64>] {
+        &self.columns
+    }
+
     /// D + (dx - D dq) dq^T / |dq|^2 for the step dq from one equilibrium to another; dq in parts of each control's range.
     fn learn(&mut self, dx: &[f64], dq: &[f64], ranges: &[f64]) {
         let parts: Vec<f64> = dq.iter().zip(ranges).map(|(d, r)| d / r).collect();
@@ -179,16 +185,12 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
                 fresh: true,
             },
         };
+        let points: Vec<MaterialPoint> = self.measured.iter().map(|m| self.markers[m.marker].point).collect();
         let model = inner.solver.model();
+        let rates = rates_at(model, &inner.base.state, self.unknowns, &directions.columns, &points);
         let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
-        for (column, (control, direction)) in self.unknowns.iter().zip(&directions.columns).enumerate() {
-            let du = model.displacement_rate(&inner.base.state, *control, direction);
-            for (row, m) in self.measured.iter().enumerate() {
-                let change = model.mesh().interpolate(self.markers[m.marker].point, &du);
-                for (i, change) in change.iter().enumerate() {
-                    j[(3 * row + i, column)] = m.weight * change;
-                }
-            }
+        for (row, (m, rate)) in self.measured.iter().zip(&rates).enumerate() {
+            j.rows_mut(3 * row, 3).copy_from(&(rate * m.weight));
         }
         inner.directions = Some(directions);
         Ok(j)

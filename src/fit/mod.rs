@@ -5,13 +5,16 @@
 //! m_k(q) is the place of marker k at the equilibrium of the forward model; nothing of this is known to the forward.
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
-//! ([`sensitivity`]). Frames follow each other warm ([`sequence`]); [`covariance`] says how far an answer can be believed.
+//! ([`sensitivity`]). Frames follow each other warm ([`sequence`]); [`covariance`] and
+//! [`identifiability`] say how far an answer can be believed, [`advise`] which further markers would tell more.
 
+pub mod advise;
 pub mod bias;
 pub mod bounded_step;
 pub mod covariance;
 pub mod frame;
 pub mod gauss_newton;
+pub mod identifiability;
 pub mod placement;
 pub mod recording;
 pub mod sensitivity;

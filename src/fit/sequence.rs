@@ -4,16 +4,17 @@ use super::covariance::{Bound, standard_deviations};
 use super::frame::{Directions, FrameProblem, Measured};
 use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
 use super::placement::{Marker, check_units, place};
-use super::sensitivity::{Reuse, Sensitivity};
+use super::sensitivity::{Reuse, Sensitivity, rates_at};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
-use crate::model::{Control, Model};
+use crate::mesh::MaterialPoint;
+use crate::model::{Control, Model, State};
 use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
-use nalgebra::DMatrix;
+use argmin::core::{Executor, Jacobian, KV, Operator, State as _, TerminationReason, TerminationStatus};
+use nalgebra::{DMatrix, DVector};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The fit of a recording.
@@ -76,6 +77,17 @@ pub struct Estimate {
     /// d(weighted residual)/d(control) at the equilibrium: three rows for every marker that was measured, a column for every
     /// control that is sought.
     pub jacobian: DMatrix<f64>,
+    /// Weighted residuals (model - measured) / sd, in the order of those rows.
+    pub residuals: Vec<f64>,
+    /// What the markers know of the controls that are sought, per unit variance of a weighted residual: J^T J.
+    pub information: DMatrix<f64>,
+    /// What the rest of the objective adds to it.
+    pub prior: DMatrix<f64>,
+    /// Gradient of the whole objective by the controls that are sought.
+    pub gradient: Vec<f64>,
+    /// The variance of a weighted residual: 1 where all markers have a standard deviation, else what the residuals of the
+    /// frame estimate; `None` where they are too few.
+    pub variance: Option<f64>,
 }
 
 impl<'m> Fit<'m> {
@@ -147,25 +159,72 @@ impl<'m> Fit<'m> {
         self.solver.work()
     }
 
+    /// All controls of the model.
+    pub fn controls(&self) -> &'m [Control] {
+        self.solver.model().controls()
+    }
+
+    /// How points of the body move with the controls that are sought, at the state of the frame that was fitted last: mm per
+    /// unit of a control, three rows and a column for each. `None` at any other state.
+    pub fn rates_at(&self, points: &[MaterialPoint], state: &State) -> Option<Vec<DMatrix<f64>>> {
+        let columns = self.directions.as_ref().filter(|_| self.last.state == *state)?.columns();
+        Some(rates_at(self.solver.model(), state, &self.unknowns, columns, points))
+    }
+
     /// Fits one frame, starting from the last one that was fitted.
     ///
     /// # Errors
     /// A frame without markers, a fit that does not converge, an equilibrium that is not found. The next frame then starts
     /// from the last good one.
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
+        let (measured_mm, measured) = self.measured(recording, frame)?;
+        let optimum = self.optimise(frame, recording.frames[frame].time_s, measured)?;
+        Ok(self.estimate(recording, frame, measured_mm, optimum))
+    }
+
+    /// The estimate of a frame for controls that are known, one for each that is sought: nothing is searched.
+    ///
+    /// # Errors
+    /// A frame without markers, an equilibrium that is not found.
+    pub fn at(&mut self, recording: &Recording, frame: usize, q: Vec<f64>) -> Result<Estimate> {
+        let (measured_mm, measured) = self.measured(recording, frame)?;
+        let problem = self.problem(recording.frames[frame].time_s, measured);
+        let residuals = problem.apply(&q).map_err(own_error)?;
+        // asked again at the same place it is taken anew, if it was kept from another
+        problem.jacobian(&q).map_err(own_error)?;
+        let jacobian = problem.jacobian(&q).map_err(own_error)?;
+        let (equilibrium, directions) = problem.into_equilibrium();
+        let cost = 0.5 * residuals.iter().map(|r| r * r).sum::<f64>();
+        let optimum = Optimum { equilibrium, directions, jacobian, residuals, cost, iterations: Vec::new() };
+        Ok(self.estimate(recording, frame, measured_mm, optimum))
+    }
+
+    /// Positions of all markers in a frame, and of those that it shows with their weights.
+    #[allow(clippy::type_complexity)] // a list and what of it is there
+    fn measured(&self, recording: &Recording, frame: usize) -> Result<(Vec<Option<[f64; 3]>>, Vec<Measured>)> {
         let shown = &recording.frames[frame];
-        let measured_mm: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
+        let all: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
         let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
             let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
             position.map(|position| Measured { marker, position, weight })
         };
-        let measured: Vec<Measured> = measured_mm.iter().enumerate().filter_map(weigh).collect();
-        if measured.is_empty() {
-            return Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s });
+        let measured: Vec<Measured> = all.iter().enumerate().filter_map(weigh).collect();
+        match measured.is_empty() {
+            true => Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s }),
+            false => Ok((all, measured)),
         }
-        let residuals = 3 * measured.len();
-        let optimum = self.optimise(frame, shown.time_s, measured)?;
-        let (bounds, sd) = self.uncertainty(&optimum, residuals);
+    }
+
+    /// What is known at the end of a frame, which the next one starts from.
+    fn estimate(
+        &mut self,
+        recording: &Recording,
+        frame: usize,
+        measured_mm: Vec<Option<[f64; 3]>>,
+        optimum: Optimum,
+    ) -> Estimate {
+        let residuals = optimum.residuals.len();
+        let (bounds, sd, variance) = self.uncertainty(&optimum, residuals);
         (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
@@ -174,9 +233,9 @@ impl<'m> Fit<'m> {
             self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
-        Ok(Estimate {
+        Estimate {
             frame,
-            time_s: shown.time_s,
+            time_s: recording.frames[frame].time_s,
             equilibrium: self.last.clone(),
             sd,
             bounds,
@@ -185,14 +244,32 @@ impl<'m> Fit<'m> {
             positions_mm,
             measured_mm,
             iterations: optimum.iterations,
+            information: optimum.jacobian.tr_mul(&optimum.jacobian),
+            prior: DMatrix::zeros(self.unknowns.len(), self.unknowns.len()),
+            gradient: optimum.jacobian.tr_mul(&DVector::from_column_slice(&optimum.residuals)).as_slice().to_vec(),
             jacobian: optimum.jacobian,
-        })
+            residuals: optimum.residuals,
+            variance,
+        }
+    }
+
+    /// A frame as a least-squares problem that starts where the last frame ended.
+    fn problem(&mut self, time_s: f64, measured: Vec<Measured>) -> FrameProblem<'_, 'm> {
+        FrameProblem::new(
+            &mut self.solver,
+            &self.markers,
+            measured,
+            &self.unknowns,
+            (self.sensitivity, self.reuse),
+            Drive { controls: held_at(&self.held, &self.held_curves, time_s), load: 1.0 },
+            self.last.clone(),
+            self.directions.clone(),
+        )
     }
 
     /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
     fn optimise(&mut self, frame: usize, time_s: f64, measured: Vec<Measured>) -> Result<Optimum> {
         let model = self.solver.model();
-        let held = held_at(&self.held, &self.held_curves, time_s);
         let range = |k: &usize| {
             let control = &model.controls()[*k];
             Range { lower: control.lower, upper: control.upper, onset: control.onset }
@@ -200,20 +277,11 @@ impl<'m> Fit<'m> {
         let ranges = self.unknowns.iter().map(range).collect();
         let start: Vec<f64> = self.unknowns.iter().map(|k| self.last.state.controls[*k]).collect();
         let log = Log::default();
-        let problem = FrameProblem::new(
-            &mut self.solver,
-            &self.markers,
-            measured,
-            &self.unknowns,
-            (self.sensitivity, self.reuse),
-            Drive { controls: held, load: 1.0 },
-            self.last.clone(),
-            self.directions.clone(),
-        );
+        let (tolerance, reuse) = (self.tolerance, self.reuse);
         let most = self.max_iterations as u64;
-        let solver = GaussNewton::new(ranges, self.tolerance);
-        let solver = if self.reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
-        let mut result = Executor::new(problem, solver)
+        let solver = GaussNewton::new(ranges, tolerance);
+        let solver = if reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
+        let mut result = Executor::new(self.problem(time_s, measured), solver)
             .configure(|state: GaussNewtonState| state.param(start).max_iters(most))
             .add_observer(log.clone(), ObserverMode::Always)
             .timer(false)
@@ -228,25 +296,27 @@ impl<'m> Fit<'m> {
             TerminationStatus::Terminated(TerminationReason::MaxItersReached) => Some("the iterations were used up"),
             TerminationStatus::Terminated(_) | TerminationStatus::NotTerminated => Some("it was ended from outside"),
         };
-        match (reason, result.problem.take_problem(), result.state.take_jacobian()) {
-            (None, Some(problem), Some(jacobian)) => {
+        let residuals = result.state.take_residuals();
+        match (reason, result.problem.take_problem(), result.state.take_jacobian().zip(residuals)) {
+            (None, Some(problem), Some((jacobian, residuals))) => {
                 let (equilibrium, directions) = problem.into_equilibrium();
                 let cost = result.state.get_cost();
-                Ok(Optimum { equilibrium, directions, jacobian, cost, iterations })
+                Ok(Optimum { equilibrium, directions, jacobian, residuals, cost, iterations })
             }
             (reason, ..) => Err(Error::FitNotConverged {
                 frame,
                 iterations: iterations.len(),
                 reason: reason.unwrap_or("the optimiser lost its state"),
                 step: iterations.last().map_or(f64::INFINITY, |i| i.step),
-                required: self.tolerance,
+                required: tolerance,
             }),
         }
     }
 
-    /// Where the controls lie, and their standard deviations: with the given deviations of the markers, or with what the
-    /// `residuals` of the frame estimate where not all are given.
-    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>) {
+    /// Where the controls lie, their standard deviations and the variance of a weighted residual: with the given deviations
+    /// of the markers, or with what the `residuals` of the frame estimate where not all are given.
+    #[allow(clippy::type_complexity)] // three things that belong together
+    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
         let values = optimum.equilibrium.state.controls.iter();
         let bound = |(value, control): (&f64, &Control)| match value {
             value if *value <= control.lower => Bound::Lower,
@@ -265,7 +335,7 @@ impl<'m> Fit<'m> {
         for (k, unit) in self.unknowns.iter().zip(standard_deviations(&optimum.jacobian, &sought)) {
             sd[*k] = unit.zip(variance).map(|(unit, variance)| unit * variance.sqrt());
         }
-        (bounds, sd)
+        (bounds, sd, variance)
     }
 }
 
@@ -275,6 +345,7 @@ struct Optimum {
     directions: Option<Directions>,
     /// d(weighted residual)/d(unknown control).
     jacobian: DMatrix<f64>,
+    residuals: Vec<f64>,
     /// 1/2 sum of squared weighted residuals.
     cost: f64,
     iterations: Vec<FitIteration>,

@@ -5,6 +5,7 @@
 
 pub mod factor;
 pub mod lanes;
+pub mod normal;
 pub mod ordering;
 pub mod quadrature;
 mod refine;

@@ -3,11 +3,12 @@
 use super::frame::{Frame, MarkerPair, MeshError, Probe, bone_states, contact_states, muscle_states, probe_states};
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable, MarkerTable,
-    MuscleTable, ProbeTable, write_cost,
+    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
+use crate::fit::identifiability::{ClipKnowledge, Told};
 use crate::fit::sequence::FitIteration;
 use crate::forward::{Equilibrium, Failure, Work};
 use crate::model::{Model, State};
@@ -27,7 +28,7 @@ pub struct Record<'a> {
     muscles: Option<MuscleTable>,
     bones: Option<BoneTable>,
     contacts: Option<ContactTable>,
-    fit: Option<(MarkerTable, FitTable)>,
+    fit: Option<(MarkerTable, FitTable, IdentifiabilityTables)>,
     probe_table: Option<ProbeTable>,
     estimates: Option<EstimateTable>,
     view: View,
@@ -60,7 +61,12 @@ impl<'a> Record<'a> {
             muscles: model.muscles().next().map(|_| MuscleTable::create(run)).transpose()?,
             bones: model.bones().first().map(|_| BoneTable::create(run)).transpose()?,
             contacts: model.contacts().next().map(|_| ContactTable::create(run)).transpose()?,
-            fit: if fitted { Some((MarkerTable::create(run)?, FitTable::create(run)?)) } else { None },
+            fit: match fitted {
+                true => {
+                    Some((MarkerTable::create(run)?, FitTable::create(run)?, IdentifiabilityTables::create(run)?))
+                }
+                false => None,
+            },
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
             estimates: None,
             view: View::new(run),
@@ -95,7 +101,7 @@ impl<'a> Record<'a> {
         if let Some(table) = &mut self.contacts {
             table.add(frame, &contact_states(self.model, state))?;
         }
-        if let Some((table, fit)) = &mut self.fit {
+        if let Some((table, fit, _)) = &mut self.fit {
             table.add(frame, markers)?;
             fit.add(frame, iterations)?;
         }
@@ -108,6 +114,29 @@ impl<'a> Record<'a> {
         self.frames += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Writes what the markers of a frame tell; `names` are those of all controls and of all markers, `biases` one per control
+    /// that was sought or none.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn told(
+        &mut self,
+        frame: Frame,
+        told: &Told,
+        names: (&[String], &[String]),
+        biases: &[Option<f64>],
+    ) -> Result<()> {
+        self.fit.as_mut().map_or(Ok(()), |(.., tables)| tables.add(frame, told, names, biases))
+    }
+
+    /// Writes which combinations of controls the whole clip tells.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn told_of_clip(&mut self, clip: &ClipKnowledge, controls: &[String]) -> Result<()> {
+        self.fit.as_mut().map_or(Ok(()), |(.., tables)| tables.clip(&clip.combinations(), controls))
     }
 
     /// Writes the estimated errors of a frame.
