@@ -14,8 +14,8 @@ use crate::error::Result;
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
-use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
-use crate::report::{FailedFrame, Frame, MarkerPair, Record};
+use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors, Outliers};
+use crate::report::{FailedFrame, Frame, MarkerPair, Outlier, Record};
 use crate::scene::{ControlRange, FitSpec, Scene};
 
 /// Fits every frame, writes it, prints the page.
@@ -43,6 +43,7 @@ pub(super) fn fit(
     let mut tally = Tally::default();
     let mut fitted = Vec::new();
     let mut errors = MarkerErrors::default();
+    let mut outliers = Outliers::default();
     for &index in frames {
         if run.is_interrupted() {
             tally.interrupted = true;
@@ -64,6 +65,9 @@ pub(super) fn fit(
                     fit.work().linear.factorisations - before
                 ));
                 tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
+                let aside = set_aside(&names, &estimate);
+                record.objectives(frame, &estimate.costs, &aside)?;
+                outliers.add(&aside);
                 let estimated = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
                 tally.warn(frame, estimated.warning.into_iter().collect(), &mut meter, flags);
                 let biases: Vec<_> =
@@ -100,6 +104,8 @@ pub(super) fn fit(
         frames_failed: tally.failed.len(),
         errors: &errors,
         mesh_errors: &estimates.errors,
+        objective: &fit.words(),
+        outliers: &outliers,
         told: &telling.clip,
         markers: &names,
         iterations: work.iterations,
@@ -125,4 +131,16 @@ fn pairs<'n>(names: &'n [String], estimate: &Estimate) -> Vec<MarkerPair<'n>> {
         .zip(&estimate.measured_mm)
         .map(|((name, model), measured)| MarkerPair { name, model: *model, measured: *measured })
         .collect()
+}
+
+/// Markers that count less than half of what one nearby does.
+fn set_aside<'n>(names: &'n [String], estimate: &Estimate) -> Vec<Outlier<'n>> {
+    let shown = (0..names.len()).filter(|marker| estimate.measured_mm[*marker].is_some());
+    let pairs = pairs(names, estimate);
+    let outlier = |(at, marker): (usize, usize)| {
+        let sds: f64 = estimate.residuals[3 * at..3 * at + 3].iter().map(|r| r * r).sum();
+        let distance_mm = pairs[marker].distance().unwrap_or(0.0);
+        Outlier { name: &names[marker], distance_mm, distance_sds: sds.sqrt(), weight: estimate.weights[at] }
+    };
+    shown.enumerate().map(outlier).filter(|outlier| outlier.weight < 0.5).collect()
 }

@@ -193,6 +193,8 @@ fn input_files(source: &Source) -> Vec<PathBuf> {
         GeometrySpec::Face(face) => face.landmarks.clone(),
         GeometrySpec::Block(_) | GeometrySpec::Blocks(_) | GeometrySpec::FaceMuscle(_) => None,
     });
+    let expected = scene.fit.iter().filter(|_| scene.task == Task::Fit).flat_map(|fit| &fit.objectives.priors);
+    let curves = curves.chain(expected.map(|prior| prior.csv.clone()));
     let mut files: Vec<PathBuf> = curves.chain(meshes).chain(markers.map(|f| f.markers.clone())).collect();
     files.sort();
     files.dedup();

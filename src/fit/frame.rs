@@ -1,5 +1,7 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
+use super::gauss_newton::LeastSquares;
+use super::objective::{Instant, Objectives, Past, Sum};
 use super::placement::Marker;
 use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
 use crate::error::{Error, Result};
@@ -29,7 +31,65 @@ pub struct FrameProblem<'f, 'm> {
     sensitivity: Sensitivity,
     reuse: Reuse,
     drive: Drive,
+    aims: Aims<'f>,
     inner: RefCell<Inner<'f, 'm>>,
+}
+
+/// What a frame minimises.
+#[derive(Clone, Copy)]
+pub struct Aims<'f> {
+    /// All parts.
+    pub objectives: &'f Objectives,
+    /// Time of the frame, s.
+    pub time_s: f64,
+    /// Frames before it, the last one first.
+    pub before: &'f [Past],
+}
+
+impl Aims<'_> {
+    /// All but the markers, by the controls in parts of their ranges.
+    pub fn rest(&self, q: &[f64]) -> Sum {
+        let a = self.objectives.parts_of(q);
+        self.objectives.rest(&Instant { time_s: self.time_s, a: &a, before: self.before })
+    }
+
+    /// Name and value of every part; the markers first.
+    pub fn values(&self, q: &[f64], residuals: &[f64]) -> Vec<(&'static str, f64)> {
+        let a = self.objectives.parts_of(q);
+        let rest = self.objectives.values(&Instant { time_s: self.time_s, a: &a, before: self.before });
+        std::iter::once(("markers", self.objectives.loss.cost(residuals))).chain(rest).collect()
+    }
+
+    /// The second derivative of all but the markers, by the controls in their units.
+    pub fn prior(&self, q: &[f64]) -> DMatrix<f64> {
+        let sizes: Vec<f64> = self.objectives.sizes().collect();
+        let hessian = self.rest(q).hessian;
+        DMatrix::from_fn(q.len(), q.len(), |a, b| hessian[(a, b)] / (sizes[a] * sizes[b]))
+    }
+}
+
+impl LeastSquares for Aims<'_> {
+    fn cost(&self, q: &[f64], residuals: &[f64]) -> f64 {
+        self.objectives.loss.cost(residuals) + self.rest(q).value
+    }
+
+    fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        let (mut g, mut h) = self.objectives.loss.model(residuals, j);
+        let rest = self.rest(q);
+        g.iter_mut().zip(rest.gradient.iter().zip(self.objectives.sizes())).for_each(|(g, (r, size))| *g += r / size);
+        h += self.prior(q);
+        (g, h)
+    }
+}
+
+impl LeastSquares for FrameProblem<'_, '_> {
+    fn cost(&self, q: &[f64], residuals: &[f64]) -> f64 {
+        self.aims.cost(q, residuals)
+    }
+
+    fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        self.aims.model(q, residuals, j)
+    }
 }
 
 struct Inner<'f, 'm> {
@@ -82,12 +142,12 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         measured: Vec<Measured>,
         unknowns: &'f [usize],
         (sensitivity, reuse): (Sensitivity, Reuse),
-        drive: Drive,
+        (drive, aims): (Drive, Aims<'f>),
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
         let inner = RefCell::new(Inner { solver, base: start, directions, trial: None });
-        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, inner }
+        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, inner }
     }
 
     /// The equilibrium at which the derivative was last asked for, the last one that the iteration accepted, and the

@@ -1,8 +1,9 @@
 //! From markers back to controls: which activations put the markers where the recording saw them.
 //!
-//!   minimise over q:  1/2 sum over present markers |m_k(q) - z_k|^2 / sd_k^2,   lower <= q <= upper
+//!   minimise over q:  1/2 sum over present markers |m_k(q) - z_k|^2 / sd_k^2 + what else is asked for,   lower <= q <= upper
 //!
 //! m_k(q) is the place of marker k at the equilibrium of the forward model; nothing of this is known to the forward.
+//! [`objective`] has the rest.
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
 //! ([`sensitivity`]). Frames follow each other warm ([`sequence`]); [`covariance`] and
@@ -15,6 +16,7 @@ pub mod covariance;
 pub mod frame;
 pub mod gauss_newton;
 pub mod identifiability;
+pub mod objective;
 pub mod placement;
 pub mod recording;
 pub mod sensitivity;

@@ -1,8 +1,10 @@
 //! A clip, frame after frame: each fit starts where the last one ended.
 
 use super::covariance::{Bound, standard_deviations};
-use super::frame::{Directions, FrameProblem, Measured};
-use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
+use super::frame::{Aims, Directions, FrameProblem, Measured};
+use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
+use super::identifiability::Evidence;
+use super::objective::{Objectives, Past};
 use super::placement::{Marker, check_units, place};
 use super::sensitivity::{Reuse, Sensitivity, rates_at};
 use crate::error::{Error, Result};
@@ -14,7 +16,7 @@ use crate::model::{Control, Model, State};
 use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, Jacobian, KV, Operator, State as _, TerminationReason, TerminationStatus};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The fit of a recording.
@@ -31,6 +33,9 @@ pub struct Fit<'m> {
     reuse: Reuse,
     tolerance: f64,
     max_iterations: usize,
+    objectives: Objectives,
+    /// Frames that were fitted, the last one first.
+    before: Vec<Past>,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
     known_sd: bool,
     /// The equilibrium of the last frame, and the sensitivities there.
@@ -41,7 +46,7 @@ pub struct Fit<'m> {
 /// One iteration of a frame's fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitIteration {
-    /// 1/2 sum of squared weighted residuals after it.
+    /// The objective after it: 1/2 sum of squared weighted residuals, and what else is asked for.
     pub cost: f64,
     /// Largest change of a control, as a part of its range.
     pub step: f64,
@@ -79,7 +84,12 @@ pub struct Estimate {
     pub jacobian: DMatrix<f64>,
     /// Weighted residuals (model - measured) / sd, in the order of those rows.
     pub residuals: Vec<f64>,
-    /// What the markers know of the controls that are sought, per unit variance of a weighted residual: J^T J.
+    /// How much each measured marker counts with a robust loss, from 1 down to 0.
+    pub weights: Vec<f64>,
+    /// Name and value of every part of the objective, the markers first.
+    pub costs: Vec<(&'static str, f64)>,
+    /// What the markers know of the controls that are sought, per unit variance of a weighted residual: J^T J, with a robust
+    /// loss less of what lies far off.
     pub information: DMatrix<f64>,
     /// What the rest of the objective adds to it.
     pub prior: DMatrix<f64>,
@@ -101,6 +111,7 @@ impl<'m> Fit<'m> {
         let settings = Settings { release: false, ..settings(scene) };
         let mut solver = Solver::new(model, settings)?;
         let unknowns = sought(fit, model);
+        let objectives = Objectives::new(scene, fit, model, &unknowns)?;
         let mut held = vec![0.0; model.controls().len()];
         let mut held_curves = Vec::new();
         let ranges = scene.control_ranges();
@@ -139,6 +150,8 @@ impl<'m> Fit<'m> {
             },
             tolerance: fit.tolerance,
             max_iterations: fit.max_iterations,
+            objectives,
+            before: Vec::new(),
             last,
             directions: None,
         })
@@ -194,7 +207,7 @@ impl<'m> Fit<'m> {
         problem.jacobian(&q).map_err(own_error)?;
         let jacobian = problem.jacobian(&q).map_err(own_error)?;
         let (equilibrium, directions) = problem.into_equilibrium();
-        let cost = 0.5 * residuals.iter().map(|r| r * r).sum::<f64>();
+        let cost = self.objectives.loss.cost(&residuals);
         let optimum = Optimum { equilibrium, directions, jacobian, residuals, cost, iterations: Vec::new() };
         Ok(self.estimate(recording, frame, measured_mm, optimum))
     }
@@ -223,8 +236,13 @@ impl<'m> Fit<'m> {
         measured_mm: Vec<Option<[f64; 3]>>,
         optimum: Optimum,
     ) -> Estimate {
-        let residuals = optimum.residuals.len();
-        let (bounds, sd, variance) = self.uncertainty(&optimum, residuals);
+        let time_s = recording.frames[frame].time_s;
+        let q: Vec<f64> = self.unknowns.iter().map(|k| optimum.equilibrium.state.controls[*k]).collect();
+        let aims = Aims { objectives: &self.objectives, time_s, before: &self.before };
+        let (gradient, _) = aims.model(&q, &optimum.residuals, &optimum.jacobian);
+        let information = self.objectives.loss.model(&optimum.residuals, &optimum.jacobian).1;
+        let (prior, costs) = (aims.prior(&q), aims.values(&q, &optimum.residuals));
+        let (bounds, sd, variance) = self.uncertainty(&optimum, &(&information + &prior));
         (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
@@ -233,9 +251,9 @@ impl<'m> Fit<'m> {
             self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
-        Estimate {
+        let estimate = Estimate {
             frame,
-            time_s: recording.frames[frame].time_s,
+            time_s,
             equilibrium: self.last.clone(),
             sd,
             bounds,
@@ -244,24 +262,30 @@ impl<'m> Fit<'m> {
             positions_mm,
             measured_mm,
             iterations: optimum.iterations,
-            information: optimum.jacobian.tr_mul(&optimum.jacobian),
-            prior: DMatrix::zeros(self.unknowns.len(), self.unknowns.len()),
-            gradient: optimum.jacobian.tr_mul(&DVector::from_column_slice(&optimum.residuals)).as_slice().to_vec(),
+            information,
+            prior,
+            gradient,
+            weights: self.objectives.loss.weights(&optimum.residuals),
+            costs,
             jacobian: optimum.jacobian,
             residuals: optimum.residuals,
             variance,
-        }
+        };
+        self.remember(&estimate);
+        estimate
     }
 
     /// A frame as a least-squares problem that starts where the last frame ended.
     fn problem(&mut self, time_s: f64, measured: Vec<Measured>) -> FrameProblem<'_, 'm> {
+        let aims = Aims { objectives: &self.objectives, time_s, before: &self.before };
+        let drive = Drive { controls: held_at(&self.held, &self.held_curves, time_s), load: 1.0 };
         FrameProblem::new(
             &mut self.solver,
             &self.markers,
             measured,
             &self.unknowns,
             (self.sensitivity, self.reuse),
-            Drive { controls: held_at(&self.held, &self.held_curves, time_s), load: 1.0 },
+            (drive, aims),
             self.last.clone(),
             self.directions.clone(),
         )
@@ -300,7 +324,7 @@ impl<'m> Fit<'m> {
         match (reason, result.problem.take_problem(), result.state.take_jacobian().zip(residuals)) {
             (None, Some(problem), Some((jacobian, residuals))) => {
                 let (equilibrium, directions) = problem.into_equilibrium();
-                let cost = result.state.get_cost();
+                let cost = 0.5 * residuals.iter().map(|r| r * r).sum::<f64>();
                 Ok(Optimum { equilibrium, directions, jacobian, residuals, cost, iterations })
             }
             (reason, ..) => Err(Error::FitNotConverged {
@@ -313,10 +337,27 @@ impl<'m> Fit<'m> {
         }
     }
 
+    /// Keeps what the next frames expect. A control on a bound is as uncertain as its one-sided interval says.
+    fn remember(&mut self, estimate: &Estimate) {
+        let Some(evidence) = Evidence::of(estimate, self.controls(), &self.unknowns) else { return };
+        if self.objectives.smoothness.is_none() {
+            return;
+        }
+        let covariance = evidence.covariance();
+        self.before
+            .insert(0, Past { time_s: estimate.time_s, a: self.objectives.parts_of(&evidence.values), covariance });
+        self.before.truncate(Past::KEPT);
+    }
+
+    /// What is minimised, in a line.
+    pub fn words(&self) -> String {
+        self.objectives.words()
+    }
+
     /// Where the controls lie, their standard deviations and the variance of a weighted residual: with the given deviations
-    /// of the markers, or with what the `residuals` of the frame estimate where not all are given.
+    /// of the markers, or with what the residuals of the frame estimate where not all are given. `whole` is the information of the frame.
     #[allow(clippy::type_complexity)] // three things that belong together
-    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
+    fn uncertainty(&self, optimum: &Optimum, whole: &DMatrix<f64>) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
         let values = optimum.equilibrium.state.controls.iter();
         let bound = |(value, control): (&f64, &Control)| match value {
             value if *value <= control.lower => Bound::Lower,
@@ -326,13 +367,14 @@ impl<'m> Fit<'m> {
         let bounds: Vec<Bound> = values.zip(self.solver.model().controls()).map(bound).collect();
         let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
         let free = sought.iter().filter(|b| **b == Bound::Free).count();
+        let residuals = optimum.residuals.len();
         let variance = if self.known_sd {
             Some(1.0)
         } else {
             (residuals > free).then(|| 2.0 * optimum.cost / (residuals - free) as f64)
         };
         let mut sd = vec![None; bounds.len()];
-        for (k, unit) in self.unknowns.iter().zip(standard_deviations(&optimum.jacobian, &sought)) {
+        for (k, unit) in self.unknowns.iter().zip(standard_deviations(whole, &sought)) {
             sd[*k] = unit.zip(variance).map(|(unit, variance)| unit * variance.sqrt());
         }
         (bounds, sd, variance)

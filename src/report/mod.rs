@@ -28,7 +28,7 @@ pub mod view;
 pub mod vtu;
 
 pub use frame::{
-    BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Probe, ProbeState, bone_states,
+    BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Outlier, Probe, ProbeState, bone_states,
     contact_states, muscle_states, probe_states,
 };
 pub use manifest::{Input, Manifest};

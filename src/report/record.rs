@@ -1,10 +1,12 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
-use super::frame::{Frame, MarkerPair, MeshError, Probe, bone_states, contact_states, muscle_states, probe_states};
+use super::frame::{
+    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_states, muscle_states, probe_states,
+};
 use super::run_folder::RunFolder;
 use super::tables::{
     ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
-    IdentifiabilityTables, MarkerTable, MuscleTable, ProbeTable, write_cost,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
@@ -28,7 +30,8 @@ pub struct Record<'a> {
     muscles: Option<MuscleTable>,
     bones: Option<BoneTable>,
     contacts: Option<ContactTable>,
-    fit: Option<(MarkerTable, FitTable, IdentifiabilityTables)>,
+    fit: Option<(MarkerTable, FitTable, IdentifiabilityTables, ObjectiveTable)>,
+    outliers: Option<OutlierTable>,
     probe_table: Option<ProbeTable>,
     estimates: Option<EstimateTable>,
     view: View,
@@ -62,11 +65,15 @@ impl<'a> Record<'a> {
             bones: model.bones().first().map(|_| BoneTable::create(run)).transpose()?,
             contacts: model.contacts().next().map(|_| ContactTable::create(run)).transpose()?,
             fit: match fitted {
-                true => {
-                    Some((MarkerTable::create(run)?, FitTable::create(run)?, IdentifiabilityTables::create(run)?))
-                }
+                true => Some((
+                    MarkerTable::create(run)?,
+                    FitTable::create(run)?,
+                    IdentifiabilityTables::create(run)?,
+                    ObjectiveTable::create(run)?,
+                )),
                 false => None,
             },
+            outliers: None,
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
             estimates: None,
             view: View::new(run),
@@ -101,7 +108,7 @@ impl<'a> Record<'a> {
         if let Some(table) = &mut self.contacts {
             table.add(frame, &contact_states(self.model, state))?;
         }
-        if let Some((table, fit, _)) = &mut self.fit {
+        if let Some((table, fit, ..)) = &mut self.fit {
             table.add(frame, markers)?;
             fit.add(frame, iterations)?;
         }
@@ -128,7 +135,24 @@ impl<'a> Record<'a> {
         names: (&[String], &[String]),
         biases: &[Option<f64>],
     ) -> Result<()> {
-        self.fit.as_mut().map_or(Ok(()), |(.., tables)| tables.add(frame, told, names, biases))
+        self.fit.as_mut().map_or(Ok(()), |(_, _, tables, _)| tables.add(frame, told, names, biases))
+    }
+
+    /// Writes what the parts of the objective of a frame cost, and the markers that its loss sets aside.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn objectives(&mut self, frame: Frame, costs: &[(&str, f64)], outliers: &[Outlier<'_>]) -> Result<()> {
+        if let Some((.., table)) = &mut self.fit {
+            table.add(frame, costs)?;
+        }
+        if outliers.is_empty() {
+            return Ok(());
+        }
+        if self.outliers.is_none() {
+            self.outliers = Some(OutlierTable::create(self.run)?);
+        }
+        self.outliers.as_mut().map_or(Ok(()), |table| table.add(frame, outliers))
     }
 
     /// Writes which combinations of controls the whole clip tells.
@@ -136,7 +160,7 @@ impl<'a> Record<'a> {
     /// # Errors
     /// Where a file cannot be written.
     pub fn told_of_clip(&mut self, clip: &ClipKnowledge, controls: &[String]) -> Result<()> {
-        self.fit.as_mut().map_or(Ok(()), |(.., tables)| tables.clip(&clip.combinations(), controls))
+        self.fit.as_mut().map_or(Ok(()), |(_, _, tables, _)| tables.clip(&clip.combinations(), controls))
     }
 
     /// Writes the estimated errors of a frame.

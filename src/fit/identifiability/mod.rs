@@ -13,7 +13,7 @@ pub use clip::{ClipKnowledge, Weak};
 pub use pairs::{Pair, TOO_ALIKE};
 
 use super::bounded_step::bounded_step;
-use super::covariance::Bound;
+use super::covariance::{Bound, SymmetricInverse};
 use super::placement::Marker;
 use super::sequence::Estimate;
 use crate::error::Result;
@@ -180,6 +180,27 @@ impl Evidence {
         })
     }
 
+    /// The covariance of the controls in parts of their ranges: of those that are free, and on the diagonal the square of what a
+    /// one-sided interval has for a standard deviation. What is not determined is known by its range.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let n = self.unknowns.len();
+        let free = self.free();
+        let whole = &self.information + &self.prior;
+        let ranges = DMatrix::from_diagonal_element(free.len(), free.len(), RANGE_ALONE);
+        let known = whole.select_rows(&free).select_columns(&free) + ranges;
+        let mut covariance = DMatrix::zeros(n, n);
+        if let Some(inverse) = known.cholesky().map(|c| c.inverse()) {
+            for (a, k) in free.iter().enumerate() {
+                free.iter().enumerate().for_each(|(b, l)| covariance[(*k, *l)] = inverse[(a, b)]);
+            }
+        }
+        for (k, known) in self.controls().iter().enumerate().filter(|(_, known)| known.bound != Bound::Free) {
+            let spread = (known.interval[1] - known.interval[0]) / self.size(k) / TWO_SIDED_95;
+            covariance[(k, k)] = spread * spread;
+        }
+        covariance
+    }
+
     fn controls(&self) -> Vec<Known> {
         let whole = &self.information + &self.prior;
         let free = self.free();
@@ -293,52 +314,6 @@ pub(super) fn combinations(unknowns: &[usize], information: &DMatrix<f64>) -> Ve
         .collect();
     all.sort_by(|a, b| b.singular.total_cmp(&a.singular));
     all
-}
-
-/// The inverse of a positive semidefinite matrix on the directions that it sees, scaled to a unit diagonal.
-struct SymmetricInverse {
-    eigen: Option<SymmetricEigen<f64, nalgebra::Dyn>>,
-    sizes: Vec<f64>,
-}
-
-impl SymmetricInverse {
-    fn new(m: &DMatrix<f64>) -> SymmetricInverse {
-        let sizes: Vec<f64> = m.diagonal().iter().map(|d| d.max(0.0).sqrt()).collect();
-        let part = |a: usize| if sizes[a] > 0.0 { 1.0 / sizes[a] } else { 0.0 };
-        let scaled = DMatrix::from_fn(m.nrows(), m.nrows(), |a, b| m[(a, b)] * part(a) * part(b));
-        let eigen = (m.nrows() > 0).then(|| SymmetricEigen::new(scaled));
-        SymmetricInverse { eigen, sizes }
-    }
-
-    /// Entry k, k of the inverse; `None` where a direction that is not seen has a part of k.
-    fn variance(&self, k: usize) -> Option<f64> {
-        let eigen = self.eigen.as_ref()?;
-        let largest = eigen.eigenvalues.max();
-        let mut variance = 0.0;
-        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > UNSEEN * largest {
-                variance += vector[k] * vector[k] / value;
-            } else if vector[k].abs() > 1e-6 {
-                return None;
-            }
-        }
-        let variance = variance / (self.sizes[k] * self.sizes[k]);
-        variance.is_finite().then_some(variance)
-    }
-
-    /// v^T M^-1 v on the directions that are seen.
-    fn square(&self, v: &[f64]) -> f64 {
-        let Some(eigen) = &self.eigen else { return 0.0 };
-        let largest = eigen.eigenvalues.max();
-        let part = |a: usize| if self.sizes[a] > 0.0 { v[a] / self.sizes[a] } else { 0.0 };
-        eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter())
-            .filter(|(value, _)| **value > UNSEEN * largest)
-            .map(|(value, vector)| (0..v.len()).map(|a| vector[a] * part(a)).sum::<f64>().powi(2) / value)
-            .sum()
-    }
 }
 
 impl Unexplained {

@@ -1,6 +1,6 @@
 //! The page of a fit.
 
-use super::{MarkerErrors, MeshErrors, ToldSummary, columns, count, optional};
+use super::{MarkerErrors, MeshErrors, Outliers, ToldSummary, columns, count, optional};
 use crate::fit::covariance::Bound;
 use crate::fit::identifiability::ClipKnowledge;
 use crate::report::frame::Frame;
@@ -39,6 +39,10 @@ pub struct FitSummary<'a> {
     pub errors: &'a MarkerErrors,
     /// What was estimated of the mesh's error.
     pub mesh_errors: &'a MeshErrors,
+    /// What was minimised.
+    pub objective: &'a str,
+    /// Markers that a robust loss set aside.
+    pub outliers: &'a Outliers,
     /// What the markers tell.
     pub told: &'a ClipKnowledge,
     /// Names of the markers.
@@ -70,6 +74,8 @@ impl fmt::Display for FitSummary<'_> {
             frames => self.of_clip(frames, out)?,
         }
         self.of_markers(out)?;
+        write!(out, "{}", self.outliers)?;
+        writeln!(out, "  minimised: {}", self.objective)?;
         write!(out, "{}", self.mesh_errors)?;
         let kind = if self.bones { "control" } else { "muscle" };
         let told = ToldSummary { clip: self.told, controls: self.controls, markers: self.markers, kind };

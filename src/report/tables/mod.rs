@@ -14,6 +14,7 @@ mod fit;
 mod identifiability;
 mod markers;
 mod muscles;
+mod objectives;
 mod probes;
 
 pub use activations::ActivationTable;
@@ -27,6 +28,7 @@ pub use fit::FitTable;
 pub use identifiability::{IdentifiabilityTables, advice_table};
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
+pub use objectives::{ObjectiveTable, OutlierTable};
 pub use probes::ProbeTable;
 
 use super::frame::Frame;
