@@ -95,6 +95,22 @@ impl<'m> Estimates<'m> {
         Ok(Estimated { error: Some(error), warning: None })
     }
 
+    /// Writes what an earlier process had estimated.
+    pub fn known(&mut self, frame: Frame, error: &MeshError, record: &mut Record<'_>) -> Result<()> {
+        record.estimate(frame, error)?;
+        self.errors.add(frame, error, 0, 0.0);
+        Ok(())
+    }
+
+    /// What further estimates depend on.
+    pub fn tangent_states(&self) -> Option<[State; 2]> {
+        self.estimator.as_ref()?.tangent_states()
+    }
+
+    pub fn restore_tangent(&mut self, states: Option<&[State; 2]>) -> Result<()> {
+        self.estimator.as_mut().map_or(Ok(()), |estimator| estimator.restore_tangent(states))
+    }
+
     /// Work and seconds, if anything was estimated.
     pub fn cost(&self) -> Option<(Work, f64)> {
         self.estimator.as_ref().map(|estimator| (estimator.work(), estimator.seconds()))

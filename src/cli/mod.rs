@@ -4,6 +4,7 @@
 //! 4 not converged (what converged is written), 5 warnings under `--strict`, 6 input or output failed, 130 interrupted.
 
 mod advise;
+mod book;
 mod check;
 pub mod diagnostics;
 mod estimate;
@@ -16,6 +17,7 @@ mod noticed;
 mod prepare;
 mod problem;
 mod progress;
+mod resume;
 mod run;
 mod study;
 mod telling;
@@ -61,6 +63,11 @@ enum Command {
         /// What it is about
         #[arg(long, value_enum, default_value_t = Template::Face)]
         template: Template,
+    },
+    /// Go on with a fit after Ctrl-C, a crash or a full disk
+    Resume {
+        /// The folder of the run
+        run: PathBuf,
     },
     /// Which further markers would tell more of the controls
     Advise {
@@ -259,6 +266,7 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         Some(Command::Run { problem }) => run::run(problem.as_deref(), &cli.flags),
         Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
         Some(Command::New { folder, template }) => new::new(folder, *template),
+        Some(Command::Resume { run }) => resume::resume(run, &cli.flags),
         Some(Command::Advise { problem, markers, criterion, apart_mm, json }) => {
             let criterion = match criterion {
                 Optimal::D => Criterion::D,

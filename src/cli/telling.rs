@@ -1,7 +1,7 @@
 //! What the markers tell, gathered over the frames of a fit: for the tables, the page and the warning F005.
 
 use crate::error::{Result, Warning};
-use crate::fit::advise::{View, candidates};
+use crate::fit::advise::{MarkerHelp, View, candidates};
 use crate::fit::identifiability::{ClipKnowledge, Evidence, Pair};
 use crate::fit::{Estimate, Fit};
 use crate::math::tensor::{Vector, norm, subtract};
@@ -27,15 +27,7 @@ pub(super) struct Telling {
     positions: Vec<Vector>,
     taken: Vec<Vector>,
     /// The pair that is most alike, its frame, and the marker that would tell them apart best.
-    worst: Option<(Frame, Pair, Option<Help>)>,
-}
-
-/// A marker that would help: its place in mm, and the deviation of a control without and with it.
-#[derive(Clone)]
-struct Help {
-    place: Vector,
-    control: usize,
-    sd: [f64; 2],
+    worst: Option<(Frame, Pair, Option<MarkerHelp>)>,
 }
 
 impl Telling {
@@ -52,16 +44,18 @@ impl Telling {
         }
     }
 
-    /// Adds the frame that was fitted last and writes its rows; `biases` one per control that is sought, or none.
+    /// Adds a frame and writes its rows; `biases` one per control that is sought, or none. The marker that would help is sought
+    /// where the frame is the one that `fit` ended with (`live`), and otherwise known.
     pub fn frame(
         &mut self,
         frame: Frame,
         estimate: &Estimate,
         fit: &Fit<'_>,
+        (live, known): (bool, Option<MarkerHelp>),
         biases: &[Option<f64>],
         record: &mut Record<'_>,
-    ) -> Result<()> {
-        let Some(evidence) = Evidence::of(estimate, fit.controls(), fit.unknowns()) else { return Ok(()) };
+    ) -> Result<Option<MarkerHelp>> {
+        let Some(evidence) = Evidence::of(estimate, fit.controls(), fit.unknowns()) else { return Ok(None) };
         let measured: Vec<bool> = estimate.measured_mm.iter().map(Option::is_some).collect();
         let told = evidence.told(fit.markers(), &measured)?;
         record.told(frame, &told, (&self.controls, &self.markers), biases)?;
@@ -69,21 +63,22 @@ impl Telling {
         if let Some(pair) = told.pairs.first() {
             let left = |pair: &Pair| 1.0 - pair.correlation.abs();
             if self.worst.as_ref().is_none_or(|(_, worst, _)| left(pair) < WORSE * left(worst)) {
-                let help = self.help(pair, &evidence, estimate, fit);
+                let help = if live { self.help(pair, &evidence, estimate, fit) } else { known };
                 self.worst = Some((frame, pair.clone(), help));
+                return Ok(help);
             }
         }
-        Ok(())
+        Ok(None)
     }
 
     /// The marker that tells the less certain of a pair best.
-    fn help(&self, pair: &Pair, evidence: &Evidence, estimate: &Estimate, fit: &Fit<'_>) -> Option<Help> {
+    fn help(&self, pair: &Pair, evidence: &Evidence, estimate: &Estimate, fit: &Fit<'_>) -> Option<MarkerHelp> {
         let rates = fit.rates_at(&self.points, &estimate.equilibrium.state)?;
         let view = View::new(evidence, &rates, new_marker_sd(fit));
         let control = pair.controls[usize::from(pair.apart_sd[1] > pair.apart_sd[0])];
         let open = |c: usize| self.taken.iter().all(|t| norm(subtract(*t, self.positions[c])) >= APART_MM);
         let (candidate, before, after) = view.best_for(control, open)?;
-        Some(Help { place: self.positions[candidate], control, sd: [before, after] })
+        Some(MarkerHelp { place: self.positions[candidate], control, sd: [before, after] })
     }
 
     /// F005, if some pair cannot be told apart.
@@ -116,13 +111,16 @@ impl Telling {
             short(pair.apart_sd[1]),
         );
         let help = match help {
-            Some(Help { place: [x, y, z], control, sd: [before, after] }) if *after < HELPS * before => format!(
-                "a marker near ({x:.0}, {y:.0}, {z:.0}) mm would bring the sd of {} from {} to {}; more: risorius advise",
-                name(*control),
-                short(*before),
-                short(*after)
-            ),
-            _ => "no further marker tells them apart: hold one of them, or add both up".into(),
+            Some(MarkerHelp { place: [x, y, z], control, sd: [before, after] }) if *after < HELPS * before => {
+                format!(
+                    "a marker near ({x:.0}, {y:.0}, {z:.0}) mm would bring the sd of {} from {} to {}; more: risorius advise",
+                    name(*control),
+                    short(*before),
+                    short(*after)
+                )
+            }
+            Some(_) => "no further marker tells them apart: hold one of them, or add both up".into(),
+            None => "risorius advise looks for markers that tell them apart".into(),
         };
         Some((*frame, Warning { code: "F005", message, place: None, help: Some(help) }))
     }

@@ -93,6 +93,17 @@ impl View {
     }
 }
 
+/// A marker that would tell a pair of controls apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkerHelp {
+    /// Its place, mm.
+    pub place: Vector,
+    /// The control of the pair that is less certain, as an index of the model's.
+    pub control: usize,
+    /// Its standard deviation without and with the marker.
+    pub sd: [f64; 2],
+}
+
 /// A marker to add.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Advice {

@@ -54,10 +54,11 @@ impl Aims<'_> {
     }
 
     /// Name and value of every part; the markers first.
-    pub fn values(&self, q: &[f64], residuals: &[f64]) -> Vec<(&'static str, f64)> {
+    pub fn values(&self, q: &[f64], residuals: &[f64]) -> Vec<(String, f64)> {
         let a = self.objectives.parts_of(q);
         let rest = self.objectives.values(&Instant { time_s: self.time_s, a: &a, before: self.before });
-        std::iter::once(("markers", self.objectives.loss.cost(residuals))).chain(rest).collect()
+        let all = std::iter::once(("markers", self.objectives.loss.cost(residuals))).chain(rest);
+        all.map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
     /// The second derivative of all but the markers, by the controls in their units.
@@ -105,17 +106,13 @@ struct Inner<'f, 'm> {
 /// dx/dq for the unknowns, one direction each.
 #[derive(Debug, Clone)]
 pub struct Directions {
-    columns: Vec<Vec<f64>>,
+    /// One direction in the unknowns of the balance per control.
+    pub columns: Vec<Vec<f64>>,
     /// Whether they were found at the equilibrium where they are used, and not kept from another.
-    fresh: bool,
+    pub fresh: bool,
 }
 
 impl Directions {
-    /// One direction in the unknowns of the balance per control.
-    pub fn columns(&self) -> &[Vec<f64>] {
-        &self.columns
-    }
-
     /// D + (dx - D dq) dq^T / |dq|^2 for the step dq from one equilibrium to another; dq in parts of each control's range.
     fn learn(&mut self, dx: &[f64], dq: &[f64], ranges: &[f64]) {
         let parts: Vec<f64> = dq.iter().zip(ranges).map(|(d, r)| d / r).collect();
@@ -155,6 +152,15 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
     pub fn into_equilibrium(self) -> (Equilibrium, Option<Directions>) {
         let inner = self.inner.into_inner();
         (inner.base, inner.directions)
+    }
+
+    /// The equilibrium last found, whether or not the derivative was asked for there, and the sensitivities if it was.
+    pub fn into_found(self) -> (Equilibrium, Option<Directions>) {
+        let Inner { base, directions, trial, .. } = self.inner.into_inner();
+        match trial {
+            Some(trial) => (trial, None),
+            None => (base, directions),
+        }
     }
 
     /// The controls of the model for values of the unknowns.

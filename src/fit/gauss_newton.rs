@@ -213,10 +213,7 @@ where
 }
 
 fn is_not_converged(error: &ArgminError) -> bool {
-    matches!(
-        error.downcast_ref::<Error>(),
-        Some(Error::NotConverged { .. } | Error::GapNotClosed { .. } | Error::Singular { .. })
-    )
+    error.downcast_ref::<Error>().is_some_and(Error::is_not_converged)
 }
 
 fn cost<O: LeastSquares>(problem: &mut Problem<O>, q: &[f64], residuals: &[f64]) -> Result<f64, ArgminError> {

@@ -6,7 +6,8 @@
 //! [`objective`] has the rest.
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
-//! ([`sensitivity`]). Frames follow each other warm ([`sequence`]); [`covariance`] and
+//! ([`sensitivity`]). Frames follow each other warm ([`sequence`]), and may then be smoothed all
+//! at once ([`smoother`]); [`covariance`] and
 //! [`identifiability`] say how far an answer can be believed, [`advise`] which further markers would tell more.
 
 pub mod advise;
@@ -21,5 +22,6 @@ pub mod placement;
 pub mod recording;
 pub mod sensitivity;
 pub mod sequence;
+pub mod smoother;
 
 pub use sequence::{Estimate, Fit};

@@ -21,26 +21,39 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// The fit of a recording.
 pub struct Fit<'m> {
-    solver: Solver<'m>,
-    markers: Vec<Marker>,
+    pub(super) solver: Solver<'m>,
+    pub(super) markers: Vec<Marker>,
     /// Controls that are sought.
-    unknowns: Vec<usize>,
+    pub(super) unknowns: Vec<usize>,
     /// Values of all controls where they are not sought and do not change.
-    held: Vec<f64>,
+    pub(super) held: Vec<f64>,
     /// Controls that follow a table over the time of the recording.
-    held_curves: Vec<HeldCurve>,
-    sensitivity: Sensitivity,
-    reuse: Reuse,
-    tolerance: f64,
-    max_iterations: usize,
-    objectives: Objectives,
+    pub(super) held_curves: Vec<HeldCurve>,
+    pub(super) sensitivity: Sensitivity,
+    pub(super) reuse: Reuse,
+    pub(super) tolerance: f64,
+    pub(super) max_iterations: usize,
+    pub(super) objectives: Objectives,
     /// Frames that were fitted, the last one first.
-    before: Vec<Past>,
+    pub(super) before: Vec<Past>,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
-    known_sd: bool,
+    pub(super) known_sd: bool,
     /// The equilibrium of the last frame, and the sensitivities there.
-    last: Equilibrium,
-    directions: Option<Directions>,
+    pub(super) last: Equilibrium,
+    pub(super) directions: Option<Directions>,
+}
+
+/// What goes from one frame to the next: with it a fit goes on with the same bits.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    /// The last equilibrium.
+    pub last: Equilibrium,
+    /// The sensitivities there.
+    pub directions: Option<Directions>,
+    /// What the next frame is expected to be like.
+    pub before: Vec<Past>,
+    /// See [`Solver::tangent_states`].
+    pub tangent: Option<[State; 2]>,
 }
 
 /// One iteration of a frame's fit.
@@ -87,7 +100,7 @@ pub struct Estimate {
     /// How much each measured marker counts with a robust loss, from 1 down to 0.
     pub weights: Vec<f64>,
     /// Name and value of every part of the objective, the markers first.
-    pub costs: Vec<(&'static str, f64)>,
+    pub costs: Vec<(String, f64)>,
     /// What the markers know of the controls that are sought, per unit variance of a weighted residual: J^T J, with a robust
     /// loss less of what lies far off.
     pub information: DMatrix<f64>,
@@ -98,6 +111,8 @@ pub struct Estimate {
     /// The variance of a weighted residual: 1 where all markers have a standard deviation, else what the residuals of the
     /// frame estimate; `None` where they are too few.
     pub variance: Option<f64>,
+    /// Whether its markers were not used: it had failed, and smoothness bridges it.
+    pub bridged: bool,
 }
 
 impl<'m> Fit<'m> {
@@ -167,6 +182,26 @@ impl<'m> Fit<'m> {
         &self.unknowns
     }
 
+    /// What the next frame depends on.
+    pub fn memory(&self) -> Memory {
+        Memory {
+            last: self.last.clone(),
+            directions: self.directions.clone(),
+            before: self.before.clone(),
+            tangent: self.solver.tangent_states(),
+        }
+    }
+
+    /// Goes on from there.
+    ///
+    /// # Errors
+    /// Where the tangent cannot be factorised.
+    pub fn restore(&mut self, memory: Memory) -> Result<()> {
+        let Memory { last, directions, before, tangent } = memory;
+        (self.last, self.directions, self.before) = (last, directions, before);
+        self.solver.restore_tangent(tangent.as_ref())
+    }
+
     /// Work done so far.
     pub fn work(&self) -> Work {
         self.solver.work()
@@ -180,7 +215,7 @@ impl<'m> Fit<'m> {
     /// How points of the body move with the controls that are sought, at the state of the frame that was fitted last: mm per
     /// unit of a control, three rows and a column for each. `None` at any other state.
     pub fn rates_at(&self, points: &[MaterialPoint], state: &State) -> Option<Vec<DMatrix<f64>>> {
-        let columns = self.directions.as_ref().filter(|_| self.last.state == *state)?.columns();
+        let columns = &self.directions.as_ref().filter(|_| self.last.state == *state)?.columns;
         Some(rates_at(self.solver.model(), state, &self.unknowns, columns, points))
     }
 
@@ -190,7 +225,7 @@ impl<'m> Fit<'m> {
     /// A frame without markers, a fit that does not converge, an equilibrium that is not found. The next frame then starts
     /// from the last good one.
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
-        let (measured_mm, measured) = self.measured(recording, frame)?;
+        let (measured_mm, measured) = self.shown(recording, frame)?;
         let optimum = self.optimise(frame, recording.frames[frame].time_s, measured)?;
         Ok(self.estimate(recording, frame, measured_mm, optimum))
     }
@@ -200,7 +235,7 @@ impl<'m> Fit<'m> {
     /// # Errors
     /// A frame without markers, an equilibrium that is not found.
     pub fn at(&mut self, recording: &Recording, frame: usize, q: Vec<f64>) -> Result<Estimate> {
-        let (measured_mm, measured) = self.measured(recording, frame)?;
+        let (measured_mm, measured) = self.shown(recording, frame)?;
         let problem = self.problem(recording.frames[frame].time_s, measured);
         let residuals = problem.apply(&q).map_err(own_error)?;
         // asked again at the same place it is taken anew, if it was kept from another
@@ -213,23 +248,28 @@ impl<'m> Fit<'m> {
     }
 
     /// Positions of all markers in a frame, and of those that it shows with their weights.
-    #[allow(clippy::type_complexity)] // a list and what of it is there
-    fn measured(&self, recording: &Recording, frame: usize) -> Result<(Vec<Option<[f64; 3]>>, Vec<Measured>)> {
+    pub(super) fn measured(&self, recording: &Recording, frame: usize) -> (Vec<Option<[f64; 3]>>, Vec<Measured>) {
         let shown = &recording.frames[frame];
         let all: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
         let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
             let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
             position.map(|position| Measured { marker, position, weight })
         };
-        let measured: Vec<Measured> = all.iter().enumerate().filter_map(weigh).collect();
+        let measured = all.iter().enumerate().filter_map(weigh).collect();
+        (all, measured)
+    }
+
+    /// The same of a frame that must show some.
+    fn shown(&self, recording: &Recording, frame: usize) -> Result<(Vec<Option<[f64; 3]>>, Vec<Measured>)> {
+        let (all, measured) = self.measured(recording, frame);
         match measured.is_empty() {
-            true => Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s }),
+            true => Err(Error::NoMarkersInFrame { frame, time_s: recording.frames[frame].time_s }),
             false => Ok((all, measured)),
         }
     }
 
     /// What is known at the end of a frame, which the next one starts from.
-    fn estimate(
+    pub(super) fn estimate(
         &mut self,
         recording: &Recording,
         frame: usize,
@@ -257,7 +297,7 @@ impl<'m> Fit<'m> {
             equilibrium: self.last.clone(),
             sd,
             bounds,
-            rms_mm: (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt(),
+            rms_mm: (distances.iter().map(|d| d * d).sum::<f64>() / distances.len().max(1) as f64).sqrt(),
             max_mm: distances.iter().copied().fold(0.0, f64::max),
             positions_mm,
             measured_mm,
@@ -270,6 +310,7 @@ impl<'m> Fit<'m> {
             jacobian: optimum.jacobian,
             residuals: optimum.residuals,
             variance,
+            bridged: false,
         };
         self.remember(&estimate);
         estimate
@@ -382,26 +423,26 @@ impl<'m> Fit<'m> {
 }
 
 /// Where the iteration of a frame ended.
-struct Optimum {
-    equilibrium: Equilibrium,
-    directions: Option<Directions>,
+pub(super) struct Optimum {
+    pub(super) equilibrium: Equilibrium,
+    pub(super) directions: Option<Directions>,
     /// d(weighted residual)/d(unknown control).
-    jacobian: DMatrix<f64>,
-    residuals: Vec<f64>,
+    pub(super) jacobian: DMatrix<f64>,
+    pub(super) residuals: Vec<f64>,
     /// 1/2 sum of squared weighted residuals.
-    cost: f64,
-    iterations: Vec<FitIteration>,
+    pub(super) cost: f64,
+    pub(super) iterations: Vec<FitIteration>,
 }
 
 /// Controls of one name that are not sought and follow a table.
-struct HeldCurve {
+pub(super) struct HeldCurve {
     controls: Vec<usize>,
     name: String,
     curves: Curves,
 }
 
 /// The controls that are not sought, at a time in seconds; those that are, are 0.
-fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
+pub(super) fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
     let mut held = held.to_vec();
     for HeldCurve { controls, name, curves } in curves {
         if let Some(value) = curves.at(name, time_s) {
@@ -430,7 +471,7 @@ pub fn settings(scene: &Scene) -> Settings {
 }
 
 /// argmin wraps errors; ours come out again as they went in.
-fn own_error(error: argmin::core::Error) -> Error {
+pub(super) fn own_error(error: argmin::core::Error) -> Error {
     error.downcast::<Error>().unwrap_or_else(|other| Error::Optimiser { message: other.to_string() })
 }
 

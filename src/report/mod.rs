@@ -6,6 +6,7 @@
 //!   summary.txt                         the page that the terminal showed
 //!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
 //!   view/result.pvd, muscles.pvd, contact.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
+//!   state/                              checkpoints of a fit: `risorius resume` goes on from them
 //!   view/result_0000.exf, ...           the same shapes for Zinc and cmgui
 //! ```
 //!
@@ -20,6 +21,7 @@ pub mod manifest;
 pub mod pvd;
 pub mod record;
 pub mod run_folder;
+pub mod state;
 pub mod status;
 pub mod study;
 pub mod summary;

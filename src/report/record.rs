@@ -142,7 +142,7 @@ impl<'a> Record<'a> {
     ///
     /// # Errors
     /// Where a file cannot be written.
-    pub fn objectives(&mut self, frame: Frame, costs: &[(&str, f64)], outliers: &[Outlier<'_>]) -> Result<()> {
+    pub fn objectives(&mut self, frame: Frame, costs: &[(String, f64)], outliers: &[Outlier<'_>]) -> Result<()> {
         if let Some((.., table)) = &mut self.fit {
             table.add(frame, costs)?;
         }

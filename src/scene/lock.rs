@@ -3,7 +3,7 @@
 //! Every struct is taken apart field by field: a new field that is not written here does not compile.
 
 use super::Scene;
-use super::objectives::{EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
+use super::objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
 use super::spec::*;
 
 /// A number with the fewest digits that give the same bits again.
@@ -377,8 +377,19 @@ fn control_line(control: &ControlSpec) -> String {
 
 /// All but the priors, which are tables of their own.
 fn objective_lines(objectives: &ObjectivesSpec, lines: &mut Vec<String>) {
-    let ObjectivesSpec { loss, effort, sparsity, similarity, smoothness: SmoothSpec { first, second }, priors: _ } =
-        objectives;
+    let ObjectivesSpec {
+        loss,
+        effort,
+        sparsity,
+        similarity,
+        clip,
+        smoothness: SmoothSpec { first, second },
+        priors: _,
+    } = objectives;
+    lines.push(match clip {
+        ClipSpec::Causal => "clip = \"causal\"".into(),
+        ClipSpec::Smoother => "clip = \"smoother\"".into(),
+    });
     lines.push(match loss {
         MarkerLossSpec::Quadratic => "loss = \"quadratic\"".into(),
         MarkerLossSpec::HuberSds(sds) => format!("loss = {{ huber_sds = {} }}", number(*sds)),

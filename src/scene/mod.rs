@@ -30,7 +30,7 @@ pub use face::{FACE, built_in_face};
 pub use fibres::{
     AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
 };
-pub use objectives::{EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
+pub use objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
 pub use references::expected_ranges;
 pub use spec::*;
 pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};

@@ -11,6 +11,16 @@ use std::path::PathBuf;
 /// An exponent of the effort.
 const EXPONENT: Range = Range { allowed: "from 2 to 10", holds: |x| (2.0..=10.0).contains(&x) };
 
+/// How the frames of a clip are fitted: `clip`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClipSpec {
+    /// One after the other: what comes later has no say.
+    Causal,
+    /// All at once, after that.
+    Smoother,
+}
+
 /// The objective of a fit. Activations and their deviations have no unit; controls of bones count in parts of their ranges.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectivesSpec {
@@ -22,6 +32,8 @@ pub struct ObjectivesSpec {
     pub sparsity: Option<f64>,
     /// `similarity = { sd = .. }`: standard deviation of the difference between left and right.
     pub similarity: Option<f64>,
+    /// `clip`.
+    pub clip: ClipSpec,
     /// `smoothness`.
     pub smoothness: SmoothSpec,
     /// `[[fit.prior]]`.
@@ -80,6 +92,7 @@ impl Default for ObjectivesSpec {
             effort: None,
             sparsity: None,
             similarity: None,
+            clip: ClipSpec::Causal,
             smoothness: SmoothSpec::default(),
             priors: Vec::new(),
         }
@@ -130,12 +143,19 @@ pub(super) fn objectives(
             }
         })
     });
+    let clips = [("causal", ClipSpec::Causal), ("smoother", ClipSpec::Smoother)];
+    let clip = table.or("clip", ClipSpec::Causal, |item| item.choice(&clips, &[]));
+    if (clip, smoothness) == (Some(ClipSpec::Smoother), Some(SmoothSpec::default())) {
+        // present, and yet nothing ties the frames
+        table.require("smoothness", "smoothness = { sd_per_root_s = 0.2 }");
+    }
     let priors = table.tables("prior", |table| prior(table, references, unknowns));
     Some(ObjectivesSpec {
         loss: loss?,
         effort: effort?,
         sparsity: sparsity?,
         similarity: similarity?,
+        clip: clip?,
         smoothness: smoothness?,
         priors: priors?,
     })

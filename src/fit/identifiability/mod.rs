@@ -53,6 +53,8 @@ pub struct Evidence {
     pub gradient: Vec<f64>,
     /// The standard deviation that weighted residuals have: 1 where those of markers are given.
     pub sigma: f64,
+    /// Whether the frame is bridged: its markers say nothing.
+    pub bridged: bool,
 }
 
 /// What is known of a control.
@@ -133,6 +135,8 @@ pub struct Told {
     pub pairs: Vec<Pair>,
     /// Of every marker that was measured.
     pub unexplained: Vec<Unexplained>,
+    /// Whether the frame is bridged: its markers were not used.
+    pub bridged: bool,
 }
 
 impl Evidence {
@@ -153,6 +157,7 @@ impl Evidence {
             prior: square(&estimate.prior),
             gradient: estimate.gradient.iter().enumerate().map(|(k, g)| g * size(k) / variance).collect(),
             sigma: variance.sqrt(),
+            bridged: estimate.bridged,
             unknowns: unknowns.to_vec(),
             ranges,
         })
@@ -177,6 +182,7 @@ impl Evidence {
             combinations: combinations(&self.unknowns, &self.j.tr_mul(&self.j)),
             pairs: pairs::pairs(self),
             unexplained: self.unexplained(markers, measured)?,
+            bridged: self.bridged,
         })
     }
 

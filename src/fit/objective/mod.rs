@@ -80,8 +80,8 @@ pub struct Objectives {
     pub parts: Vec<Box<dyn Objective>>,
     /// What ties frames to each other.
     pub smoothness: Option<Smoothness>,
-    /// Lower bound and size of the range of each control that is sought.
-    ranges: Vec<(f64, f64)>,
+    /// Lower bound, upper bound and size of the range of each control that is sought.
+    ranges: Vec<(f64, f64, f64)>,
 }
 
 impl Objectives {
@@ -106,7 +106,7 @@ impl Objectives {
         }
         let range = |k: &usize| {
             let control = &model.controls()[*k];
-            (control.lower, control.upper - control.lower)
+            (control.lower, control.upper, control.upper - control.lower)
         };
         Ok(Objectives {
             loss: Loss::from(spec.loss),
@@ -118,12 +118,22 @@ impl Objectives {
 
     /// Controls as parts of their ranges.
     pub fn parts_of(&self, q: &[f64]) -> Vec<f64> {
-        q.iter().zip(&self.ranges).map(|(q, (lower, size))| (q - lower) / size).collect()
+        q.iter().zip(&self.ranges).map(|(q, (lower, _, size))| (q - lower) / size).collect()
+    }
+
+    /// Controls from parts of their ranges; a bound is met exactly.
+    pub fn values_of(&self, a: &[f64]) -> Vec<f64> {
+        let value = |(a, (lower, upper, size)): (&f64, &(f64, f64, f64))| match *a {
+            a if a <= 0.0 => *lower,
+            a if a >= 1.0 => *upper,
+            a => lower + a * size,
+        };
+        a.iter().zip(&self.ranges).map(value).collect()
     }
 
     /// Sizes of the ranges, in the units of the controls.
     pub fn sizes(&self) -> impl Iterator<Item = f64> + '_ {
-        self.ranges.iter().map(|(_, size)| *size)
+        self.ranges.iter().map(|(.., size)| *size)
     }
 
     /// All but the markers, by the controls in parts of their ranges.

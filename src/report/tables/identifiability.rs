@@ -21,8 +21,8 @@ impl IdentifiabilityTables {
     ///
     /// - `identifiability.csv`: of every control that is sought its value, standard deviation (empty on a bound, or where the
     ///   markers do not determine it), 95 % interval, bound, where it would go without its bound, the standard deviation
-    ///   without any marker, whether the markers take less than half of that variance away, and the bias by the mesh (with
-    ///   `--estimate`).
+    ///   without any marker, whether the markers take less than half of that variance away, the bias by the mesh (with
+    ///   `--estimate`), and whether the frame had failed and is bridged by smoothness.
     /// - `combinations.csv`: singular values of the weighted derivative with controls in parts of their ranges; rows without
     ///   a frame are those of the whole clip.
     /// - `pairs.csv`: pairs whose errors correlate by more than 0.9: what is determined is `together` = a + weight b.
@@ -36,7 +36,7 @@ impl IdentifiabilityTables {
         Ok(IdentifiabilityTables {
             controls: table(
                 "identifiability",
-                "frame,time_s,control,value,sd,lower_95,upper_95,bound,wants,prior_sd,prior_dominated,bias",
+                "frame,time_s,control,value,sd,lower_95,upper_95,bound,wants,prior_sd,prior_dominated,bias,bridged",
             )?,
             combinations: table("combinations", "frame,time_s,number,singular_value,sd,determined,combination")?,
             pairs: table(
@@ -80,6 +80,7 @@ impl IdentifiabilityTables {
                 known.prior_sd.into(),
                 usize::from(known.prior_dominated).into(),
                 biases.get(k).copied().flatten().into(),
+                usize::from(told.bridged).into(),
             ]);
         }
         self.controls.append(rows)?;

@@ -19,7 +19,7 @@ impl ObjectiveTable {
     }
 
     /// Adds a frame.
-    pub fn add(&mut self, frame: Frame, costs: &[(&str, f64)]) -> Result<()> {
+    pub fn add(&mut self, frame: Frame, costs: &[(String, f64)]) -> Result<()> {
         let mut rows = Rows::default();
         let [index, time] = of_frame(frame);
         costs.iter().for_each(|(name, value)| rows.add([index, time, Cell::Text(name), (*value).into()]));
