@@ -3,11 +3,14 @@
 mod common;
 
 use common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
+use nalgebra::DMatrix;
 use risorius::fit::advise::{Criterion, View, advise, candidates};
 use risorius::fit::covariance::Bound;
 use risorius::fit::identifiability::{ClipKnowledge, Evidence, Told};
+use risorius::fit::placement::Marker;
 use risorius::fit::{Estimate, Fit};
 use risorius::markers::Recording;
+use risorius::mesh::MaterialPoint;
 use risorius::model::build::build;
 use std::path::Path;
 
@@ -151,6 +154,43 @@ fn an_advised_marker_shrinks_the_interval_that_it_names() {
         let sd = with.sd[control].expect("it is free");
         assert!((sd / after - 1.0).abs() < 0.05, "{sd} instead of {after}");
     }
+}
+
+/// All controls on bounds: intervals to one side, no pairs, nothing to advise on, and no crash.
+#[test]
+fn a_frame_with_all_controls_on_bounds_is_told_of() {
+    let evidence = Evidence {
+        unknowns: vec![0, 1],
+        ranges: vec![[0.0, 1.0], [-2.0, 2.0]],
+        values: vec![0.0, 2.0],
+        bounds: vec![Bound::Lower, Bound::Upper],
+        j: DMatrix::from_row_slice(3, 2, &[10.0, 0.0, 0.0, 20.0, 0.0, 0.0]),
+        residuals: vec![1.0, -4.0, 0.0],
+        information: DMatrix::from_row_slice(2, 2, &[100.0, 0.0, 0.0, 400.0]),
+        prior: DMatrix::zeros(2, 2),
+        gradient: vec![10.0, -80.0],
+        sigma: 1.0,
+        bridged: false,
+    };
+    let fitted = Marker {
+        name: "M".into(),
+        point: MaterialPoint { element: 0, xi: [0.0; 3] },
+        distance: 0.0,
+        sd: Some(0.5),
+        column: 0,
+    };
+    let told = evidence.told(&[fitted], &[true]).expect("solved");
+    let [low, high] = &told.controls[..] else { panic!("two") };
+    // exp(-10 u - 50 u^2) and, per quarter of its range, exp(-80 u - 200 u^2): normal tails beyond 1 and 4 deviations
+    assert!((low.interval[1] - 0.1412).abs() < 2e-4 && low.wants == Some(-0.1), "{low:?}");
+    assert!((high.interval[0] - (2.0 - 4.0 * 0.03417)).abs() < 2e-4 && high.interval[1] == 2.0, "{high:?}");
+    assert!((high.wants.expect("pushed") - 2.8).abs() < 1e-12);
+    assert!(told.pairs.is_empty() && !low.prior_dominated);
+    // no control may go where it would remove the residual
+    assert!((told.unexplained[0].left_mm[1] + 2.0).abs() < 1e-6, "{:?}", told.unexplained);
+    let rates = [DMatrix::from_element(3, 2, 5.0)];
+    let none = advise(vec![View::new(&evidence, &rates, 0.1)], &[[0.0; 3]], &[], (Criterion::D, 1, 1.0));
+    assert!(none.is_empty());
 }
 
 /// The commands: tables of a run, the bias beside the interval, advice from the problem and from the folder.

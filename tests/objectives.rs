@@ -177,7 +177,7 @@ fn smoothness_quiets_a_clip() {
     let (alone, first, second) =
         (rms(""), rms("smoothness = { sd_per_root_s = 0.008 }\n"), rms("smoothness = { sd_per_root_s3 = 0.3 }\n"));
     println!("rms of activations: alone {alone:.2e}, first {first:.2e}, second {second:.2e}");
-    assert!(first < 0.8 * alone && second < 0.95 * alone, "{alone} {first} {second}");
+    assert!(first < 0.8 * alone && second < alone, "{alone} {first} {second}");
 }
 
 /// The keys survive the lock file, and a run states what it minimised.

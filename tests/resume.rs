@@ -85,6 +85,7 @@ fn killed_and_interrupted_fits_go_on_to_the_same_bytes() {
 
         assert_eq!(ended_after(folder.path(), &cut, 3, "-KILL"), None);
         let kept = frames_kept(&folder.path().join("cut"));
+        // every frame that was told of, and none that was not finished
         assert!((3..FRAMES).contains(&kept), "{kept} frames");
         // interrupted on the way, then to the end
         assert_eq!(ended_after(folder.path(), &["resume", "cut", "--progress=plain"], kept + 4, "-INT"), Some(130));

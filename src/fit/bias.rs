@@ -5,8 +5,8 @@
 //! and the controls that were fitted are off by the opposite.
 
 use super::covariance::Bound;
+use super::estimate::Estimate;
 use super::placement::Marker;
-use super::sequence::Estimate;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Directions with less than this part of the largest singular value are not determined by the markers.

@@ -14,14 +14,17 @@ pub mod advise;
 pub mod bias;
 pub mod bounded_step;
 pub mod covariance;
+pub mod estimate;
 pub mod frame;
 pub mod gauss_newton;
 pub mod identifiability;
 pub mod objective;
+mod observed;
 pub mod placement;
 pub mod recording;
 pub mod sensitivity;
 pub mod sequence;
 pub mod smoother;
 
-pub use sequence::{Estimate, Fit};
+pub use estimate::Estimate;
+pub use sequence::Fit;

@@ -1,10 +1,12 @@
 //! A clip, frame after frame: each fit starts where the last one ended.
 
 use super::covariance::{Bound, standard_deviations};
+use super::estimate::{Estimate, Memory, Optimum};
 use super::frame::{Aims, Directions, FrameProblem, Measured};
 use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
 use super::identifiability::Evidence;
 use super::objective::{Objectives, Past};
+use super::observed::{Log, own_error};
 use super::placement::{Marker, check_units, place};
 use super::sensitivity::{Reuse, Sensitivity, rates_at};
 use crate::error::{Error, Result};
@@ -14,10 +16,9 @@ use crate::math::tensor::{norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Control, Model, State};
 use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
-use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, Jacobian, KV, Operator, State as _, TerminationReason, TerminationStatus};
+use argmin::core::observers::ObserverMode;
+use argmin::core::{Executor, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// The fit of a recording.
 pub struct Fit<'m> {
@@ -41,78 +42,6 @@ pub struct Fit<'m> {
     /// The equilibrium of the last frame, and the sensitivities there.
     pub(super) last: Equilibrium,
     pub(super) directions: Option<Directions>,
-}
-
-/// What goes from one frame to the next: with it a fit goes on with the same bits.
-#[derive(Debug, Clone)]
-pub struct Memory {
-    /// The last equilibrium.
-    pub last: Equilibrium,
-    /// The sensitivities there.
-    pub directions: Option<Directions>,
-    /// What the next frame is expected to be like.
-    pub before: Vec<Past>,
-    /// See [`Solver::tangent_states`].
-    pub tangent: Option<[State; 2]>,
-}
-
-/// One iteration of a frame's fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FitIteration {
-    /// The objective after it: 1/2 sum of squared weighted residuals, and what else is asked for.
-    pub cost: f64,
-    /// Largest change of a control, as a part of its range.
-    pub step: f64,
-    /// Trust radius after it.
-    pub trust: f64,
-    /// Steps that were tried and rejected.
-    pub rejected: u64,
-}
-
-/// The answer of a fit for a frame.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    /// Index of the frame in the recording.
-    pub frame: usize,
-    /// Its time, s.
-    pub time_s: f64,
-    /// The equilibrium; all controls are in its state.
-    pub equilibrium: Equilibrium,
-    /// Standard deviation of each control of the model; `None` on a bound, or where it is not sought or not determined.
-    pub sd: Vec<Option<f64>>,
-    /// Where each control of the model lies.
-    pub bounds: Vec<Bound>,
-    /// Model position of every marker, mm.
-    pub positions_mm: Vec<[f64; 3]>,
-    /// Measured position of every marker, mm; `None` where lost.
-    pub measured_mm: Vec<Option<[f64; 3]>>,
-    /// Root mean square distance between model and measured markers, mm.
-    pub rms_mm: f64,
-    /// Largest distance, mm.
-    pub max_mm: f64,
-    /// Gauss-Newton iterations.
-    pub iterations: Vec<FitIteration>,
-    /// d(weighted residual)/d(control) at the equilibrium: three rows for every marker that was measured, a column for every
-    /// control that is sought.
-    pub jacobian: DMatrix<f64>,
-    /// Weighted residuals (model - measured) / sd, in the order of those rows.
-    pub residuals: Vec<f64>,
-    /// How much each measured marker counts with a robust loss, from 1 down to 0.
-    pub weights: Vec<f64>,
-    /// Name and value of every part of the objective, the markers first.
-    pub costs: Vec<(String, f64)>,
-    /// What the markers know of the controls that are sought, per unit variance of a weighted residual: J^T J, with a robust
-    /// loss less of what lies far off.
-    pub information: DMatrix<f64>,
-    /// What the rest of the objective adds to it.
-    pub prior: DMatrix<f64>,
-    /// Gradient of the whole objective by the controls that are sought.
-    pub gradient: Vec<f64>,
-    /// The variance of a weighted residual: 1 where all markers have a standard deviation, else what the residuals of the
-    /// frame estimate; `None` where they are too few.
-    pub variance: Option<f64>,
-    /// Whether its markers were not used: it had failed, and smoothness bridges it.
-    pub bridged: bool,
 }
 
 impl<'m> Fit<'m> {
@@ -422,18 +351,6 @@ impl<'m> Fit<'m> {
     }
 }
 
-/// Where the iteration of a frame ended.
-pub(super) struct Optimum {
-    pub(super) equilibrium: Equilibrium,
-    pub(super) directions: Option<Directions>,
-    /// d(weighted residual)/d(unknown control).
-    pub(super) jacobian: DMatrix<f64>,
-    pub(super) residuals: Vec<f64>,
-    /// 1/2 sum of squared weighted residuals.
-    pub(super) cost: f64,
-    pub(super) iterations: Vec<FitIteration>,
-}
-
 /// Controls of one name that are not sought and follow a table.
 pub(super) struct HeldCurve {
     controls: Vec<usize>,
@@ -467,31 +384,5 @@ pub fn settings(scene: &Scene) -> Settings {
         step_min: s.step_min,
         precision: s.precision,
         ..Settings::default()
-    }
-}
-
-/// argmin wraps errors; ours come out again as they went in.
-pub(super) fn own_error(error: argmin::core::Error) -> Error {
-    error.downcast::<Error>().unwrap_or_else(|other| Error::Optimiser { message: other.to_string() })
-}
-
-/// An argmin observer that keeps what each iteration did.
-#[derive(Clone, Default)]
-struct Log(Arc<Mutex<Vec<FitIteration>>>);
-
-impl Log {
-    fn take(&self) -> Vec<FitIteration> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-impl Observe<GaussNewtonState> for Log {
-    fn observe_iter(&mut self, state: &GaussNewtonState, kv: &KV) -> std::result::Result<(), argmin::core::Error> {
-        let number = |key: &str| kv.get(key).and_then(|v| v.get_float()).unwrap_or(f64::NAN);
-        let rejected = kv.get("rejected").and_then(|v| v.get_uint()).unwrap_or(0);
-        let iteration =
-            FitIteration { cost: state.get_cost(), step: number("step"), trust: number("trust"), rejected };
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(iteration);
-        Ok(())
     }
 }

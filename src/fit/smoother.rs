@@ -9,11 +9,13 @@
 
 use super::bounded_step::bounded_step_in_chain;
 use super::covariance::{Bound, standard_deviations};
+use super::estimate::{Estimate, FitIteration, Optimum};
 use super::frame::{Aims, FrameProblem, Measured};
 use super::objective::Sum;
 use super::objective::smoothness::Link;
+use super::observed::own_error;
 use super::sensitivity::Reuse;
-use super::sequence::{Estimate, Fit, FitIteration, Optimum, held_at, own_error};
+use super::sequence::{Fit, held_at};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium};
 use crate::markers::Recording;

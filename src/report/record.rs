@@ -10,8 +10,8 @@ use super::tables::{
 };
 use super::view::View;
 use crate::error::Result;
+use crate::fit::estimate::FitIteration;
 use crate::fit::identifiability::{ClipKnowledge, Told};
-use crate::fit::sequence::FitIteration;
 use crate::forward::{Equilibrium, Failure, Work};
 use crate::model::{Model, State};
 use crate::scene::OutputSpec;

@@ -14,8 +14,8 @@ pub use pairs::{Pair, TOO_ALIKE};
 
 use super::bounded_step::bounded_step;
 use super::covariance::{Bound, SymmetricInverse};
+use super::estimate::Estimate;
 use super::placement::Marker;
-use super::sequence::Estimate;
 use crate::error::Result;
 use crate::math::normal::{TWO_SIDED_95, one_sided_95};
 use crate::math::tensor::norm;

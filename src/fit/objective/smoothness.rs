@@ -3,8 +3,8 @@
 //!   second:  |v_t - v_(t-1)|^2 / (2 s^2 dt'), v_t = (a_t - a_(t-1)) / dt, dt' the mean of both intervals: a random walk of the rate.
 //!
 //! A fit that goes frame by frame looks back: it expects what came before. For a random walk what came before is known with its
-//! own covariance C, so that a_t has the covariance C + s^2 dt 1 before its markers are seen, as in a Kalman filter; for the
-//! rate the earlier frames count as known.
+//! own covariance C, so that a_t has the covariance C + s^2 dt 1 before its markers are seen, as in a Kalman filter. For the
+//! rate the line through the last two frames is expected, as uncertain as both of them are, their errors taken as independent.
 
 use super::{Instant, Objective, Past, Sum};
 use crate::scene::SmoothSpec;
@@ -88,10 +88,15 @@ impl Objective for Smoothness {
         }
         if let (Some(s), [last, earlier, ..]) = (self.second, at.before) {
             let before = (last.time_s - earlier.time_s).abs().max(LEAST_STEP);
-            let on = |k: usize| last.a[k] + (last.a[k] - earlier.a[k]) * after / before;
-            let expected: Vec<f64> = (0..n).map(on).collect();
-            let weight = 2.0 / (s * s * (before + after) * after * after);
-            expect(&expected, &DMatrix::from_diagonal_element(n, n, weight));
+            let part = after / before;
+            let expected: Vec<f64> = (0..n).map(|k| last.a[k] + part * (last.a[k] - earlier.a[k])).collect();
+            let own = s * s * 0.5 * (before + after) * after * after;
+            let spread = &last.covariance * (1.0 + part).powi(2)
+                + &earlier.covariance * (part * part)
+                + DMatrix::from_diagonal_element(n, n, own);
+            if let Some(precision) = spread.cholesky() {
+                expect(&expected, &precision.inverse());
+            }
         }
     }
 }

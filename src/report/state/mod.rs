@@ -18,7 +18,7 @@ use super::status::{FailedFrame, write_json};
 use crate::error::{Error, Result};
 use crate::fit::Estimate;
 use crate::fit::advise::MarkerHelp;
-use crate::fit::sequence::Memory;
+use crate::fit::estimate::Memory;
 use crate::model::State;
 use crate::report::frame::MeshError;
 use codec::{Bytes, Stored};
