@@ -20,6 +20,9 @@ use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
 
+/// Positions of all markers in a frame, mm, and what of them it shows.
+pub(super) type Shown = (Vec<Option<[f64; 3]>>, Vec<Measured>);
+
 /// The fit of a recording.
 pub struct Fit<'m> {
     pub(super) solver: Solver<'m>,
@@ -177,7 +180,7 @@ impl<'m> Fit<'m> {
     }
 
     /// Positions of all markers in a frame, and of those that it shows with their weights.
-    pub(super) fn measured(&self, recording: &Recording, frame: usize) -> (Vec<Option<[f64; 3]>>, Vec<Measured>) {
+    pub(super) fn measured(&self, recording: &Recording, frame: usize) -> Shown {
         let shown = &recording.frames[frame];
         let all: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
         let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
@@ -189,7 +192,7 @@ impl<'m> Fit<'m> {
     }
 
     /// The same of a frame that must show some.
-    fn shown(&self, recording: &Recording, frame: usize) -> Result<(Vec<Option<[f64; 3]>>, Vec<Measured>)> {
+    fn shown(&self, recording: &Recording, frame: usize) -> Result<Shown> {
         let (all, measured) = self.measured(recording, frame);
         match measured.is_empty() {
             true => Err(Error::NoMarkersInFrame { frame, time_s: recording.frames[frame].time_s }),

@@ -7,6 +7,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+/// A block with those before it eliminated, and its factor without fixed variables.
+type Eliminated = (DMatrix<f64>, Cholesky<f64, Dyn>);
+
 /// The matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlockTridiagonal {
@@ -96,9 +99,9 @@ impl BlockTridiagonal {
     }
 
     /// F_k of every block with its own fixed variables in it, and the factor of it without them.
-    fn forward(&self, free: &[bool]) -> Option<Vec<(DMatrix<f64>, Cholesky<f64, Dyn>)>> {
+    fn forward(&self, free: &[bool]) -> Option<Vec<Eliminated>> {
         let starts = self.starts();
-        let mut all: Vec<(DMatrix<f64>, Cholesky<f64, Dyn>)> = Vec::new();
+        let mut all: Vec<Eliminated> = Vec::new();
         for k in 0..self.diagonal.len() {
             let mut whole = self.diagonal[k].clone();
             if k > 0 {

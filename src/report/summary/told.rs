@@ -1,7 +1,7 @@
 //! What the markers tell, on the page of a fit.
 
 use super::{columns, count};
-use crate::fit::identifiability::{ClipKnowledge, Weak};
+use crate::fit::identifiability::{ClipKnowledge, Combination, Weak};
 use std::fmt;
 
 /// Markers and combinations that are shown.
@@ -52,13 +52,20 @@ impl ToldSummary<'_> {
         let unseen: Vec<_> = all.iter().rev().filter(|c| !c.is_determined()).collect();
         if let (true, Some(weakest)) = (unseen.is_empty(), all.last()) {
             if all.len() > 1 {
-                let words = weakest.words(self.controls);
+                let words = self.words(weakest);
                 writeln!(out, "  seen least over the clip: {words}, to {:.1e} of their ranges", weakest.sd())?;
             }
             return Ok(());
         }
         writeln!(out, "  {} that no marker determines, over the whole clip:", count(unseen.len(), "combination"))?;
-        unseen.iter().take(SHOWN).try_for_each(|c| writeln!(out, "    {}", c.words(self.controls)))
+        unseen.iter().take(SHOWN).try_for_each(|c| writeln!(out, "    {}", self.words(c)))
+    }
+
+    /// The greatest parts of a combination.
+    fn words(&self, combination: &Combination) -> String {
+        let parts: Vec<_> = combination.parts.iter().take(SHOWN).copied().collect();
+        let more = if combination.parts.len() > SHOWN { " + ..." } else { "" };
+        Combination { parts, ..*combination }.words(self.controls) + more
     }
 
     fn left_over(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
