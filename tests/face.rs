@@ -168,7 +168,7 @@ fn every_named_face_is_where_its_name_says() {
     let count = |name: &str| whole.named_faces[name].len();
     assert_eq!((count("skin"), count("deep"), count("rim")), (560, 560, 2 * (28 + 20)));
     assert_eq!((count("lip.upper"), count("lip.lower"), count("lid.upper.L"), count("lid.lower.R")), (6, 6, 4, 4));
-    let parts = ["deep.perioral", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
+    let parts = ["deep.perioral", "deep.nose", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
     assert_eq!(parts.iter().sum::<usize>(), 560, "{parts:?}");
     // the lips touch: both margins are the same surface, and the corner of the mouth is where its landmark is
     for (upper, lower) in whole.named_faces["lip.upper"].iter().zip(&whole.named_faces["lip.lower"]) {
@@ -448,7 +448,7 @@ face = "zygomaticus_major"
 side = "L"
 blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }
 [[support]]
-clamp = { face = ["rim", "deep.sliding"] }
+clamp = { face = ["rim", "deep.sliding", "deep.nose"] }
 [[support]]
 symmetry = { face = "midline" }
 [[attachment]]

@@ -9,7 +9,7 @@ mod work;
 use crate::error::{Error, Likely, Result};
 use crate::math::factor::Precision;
 use crate::model::{Evaluation, Model, Renewal, State, Workspace, WorstPoint};
-use crate::solve::newton::{Assessment, Iteration, Limits, Outcome, Stop, Test, chord, newton};
+use crate::solve::newton::{Assessment, Equations, Iteration, Limits, Outcome, Stop, Test, chord, newton};
 use crate::solve::path::{StepLimits, Stepper};
 use crate::term::Want;
 use crate::term::bone::Bone;
@@ -250,6 +250,7 @@ impl<'m> Solver<'m> {
                 ),
                 None => last.clone(),
             };
+            let guess = self.nearer(guess, &last);
             let outcome = match self.attempt(guess, &last, limits) {
                 Ok(outcome) => outcome,
                 Err(error) => {
@@ -405,6 +406,19 @@ impl<'m> Solver<'m> {
         1.0 / (most * stretch).max(f64::MIN_POSITIVE)
     }
 
+    /// Where contacts open and close a prediction may be worse than the last equilibrium: the one of the two with the smaller
+    /// residual.
+    fn nearer(&mut self, predicted: State, last: &State) -> State {
+        if self.balance.model.contacts().next().is_none() {
+            return predicted;
+        }
+        let [a, b] = [&predicted, last].map(|state| {
+            let state = self.balance.at_target(state.clone());
+            self.balance.assess(&state)
+        });
+        if b.outstanding || (a.admissible && a.residual <= b.residual) { predicted } else { last.clone() }
+    }
+
     /// From the predicted state, and from the last equilibrium if the prediction is not admissible.
     fn attempt(&mut self, guess: State, last: &State, limits: Limits) -> Result<Outcome<State>> {
         self.balance.off_surface = None;
@@ -429,10 +443,11 @@ impl<'m> Solver<'m> {
     /// Newton's method. Where a contact opens or closes its forces have a kink, of which a tangent sees one side; the forces
     /// of fibres have kinks too, but there only a body that is let go has no shorter step to get past them.
     fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
-        let outcome = newton(&mut self.balance, start, limits)?;
         let model = self.balance.model;
-        let kinks =
-            model.contacts().next().is_some() || (self.balance.drag.is_some() && model.muscles().next().is_some());
+        let contacts = model.contacts().next().is_some();
+        let test = if contacts { Test::MonotoneOrLower } else { limits.test };
+        let outcome = newton(&mut self.balance, start, Limits { test, ..limits })?;
+        let kinks = contacts || (self.balance.drag.is_some() && model.muscles().next().is_some());
         if outcome.stop != Some(Stop::NoDescent) || !kinks {
             return Ok(outcome);
         }

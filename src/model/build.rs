@@ -25,7 +25,7 @@ use crate::term::Term;
 use crate::term::bone::Bone;
 use crate::term::contact::law::{Allows, Augmented, Barrier, ContactLaw, Penalty, Smooth};
 use crate::term::contact::mutual::{Between, Manner, Mutual};
-use crate::term::contact::surface::{Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
+use crate::term::contact::surface::{Arch, Capsule, Cylinder, FreeSide, Patches, Plane, RigidSurface, Sphere};
 use crate::term::contact::{Contact, Interface};
 use crate::term::load::{FollowerPressure, body_force, gravity, nodal_force, traction};
 use crate::term::muscle::{Activation, Muscle, NotEmbedded};
@@ -367,7 +367,7 @@ fn contact(
             (Between::Two(own, others), *depth_mm)
         }
         SurfaceSpec::Itself { depth_mm } => (Between::Itself(own), *depth_mm),
-        SurfaceSpec::Reference(Some(face)) => {
+        SurfaceSpec::Reference(Some(face)) | SurfaceSpec::Arch(face) => {
             let before = faces(scene, mesh, face, &spec.place)?;
             return rigid_contact(spec, allows, mesh, [&own, &before], bone);
         }
@@ -416,6 +416,7 @@ fn rigid_contact(
         SurfaceSpec::Capsule { from_mm, to_mm, radius_mm, inside } => {
             Box::new(Capsule { ends: [from_mm, to_mm], radius: radius_mm, free: free(inside) })
         }
+        SurfaceSpec::Arch(_) => Box::new(Arch::new(mesh, before)),
         SurfaceSpec::Reference(_) | SurfaceSpec::Faces { .. } | SurfaceSpec::Itself { .. } => {
             Box::new(Patches::new(mesh, before, FreeSide::Inside))
         }

@@ -82,6 +82,7 @@ fn surface(table: &mut Table) -> Option<SurfaceSpec> {
         ("cylinder", |item| item.table(cylinder)),
         ("capsule", |item| item.table(capsule)),
         ("reference", reference),
+        ("arch", |item| faces(item).map(SurfaceSpec::Arch)),
         ("faces", |item| item.table(other_faces)),
         ("itself", |item| item.table(|table| Some(SurfaceSpec::Itself { depth_mm: depth(table)? }))),
     ])

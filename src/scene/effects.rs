@@ -71,7 +71,8 @@ impl Scene {
             | SurfaceSpec::Sphere { .. }
             | SurfaceSpec::Cylinder { .. }
             | SurfaceSpec::Capsule { .. }
-            | SurfaceSpec::Reference(_) => "contact with a rigid surface",
+            | SurfaceSpec::Reference(_)
+            | SurfaceSpec::Arch(_) => "contact with a rigid surface",
             SurfaceSpec::Faces { .. } => "contact with other faces",
             SurfaceSpec::Itself { .. } => "contact with itself",
         });

@@ -314,6 +314,7 @@ fn surface_entry(surface: &SurfaceSpec) -> String {
             round(radius_mm, inside)
         ),
         SurfaceSpec::Reference(None) => "reference = true".into(),
+        SurfaceSpec::Arch(face) => format!("arch = {}", faces(face)),
         SurfaceSpec::Reference(Some(face)) => format!("reference = {}", faces(face)),
         SurfaceSpec::Faces { face, depth_mm } => {
             let depth = depth_mm.map(|depth| format!(", depth_mm = {}", number(depth))).unwrap_or_default();

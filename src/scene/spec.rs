@@ -458,6 +458,8 @@ pub enum SurfaceSpec {
     /// A face of the host where it was before anything moved; the body is on its own side of it. `None`: the face that
     /// meets it.
     Reference(Option<FaceSpec>),
+    /// A smooth surface behind faces of the host: teeth and jaws. The body is in front of it.
+    Arch(FaceSpec),
     /// Other faces of the host, which yield; not for sliding.
     Faces {
         /// The faces.

@@ -71,6 +71,9 @@ pub struct Limits {
 pub enum Test {
     /// Natural monotonicity, for smooth equations.
     Monotone,
+    /// Natural monotonicity, or a residual that has lost half of the part of the step: for equations with kinks, where the
+    /// old tangent makes much of a small residual behind a kink.
+    MonotoneOrLower,
     /// The slope d . r of the energy along the step must have lost a part of its size, for equations with kinks. Just
     /// before a kink no step is monotone, however short; this search ends behind it, where the tangent is another.
     Slope,
@@ -78,6 +81,8 @@ pub enum Test {
 
 /// A Newton step below this is rounding: where no such step makes the residual smaller, nothing will.
 const NEGLIGIBLE: f64 = 1e-10;
+/// Part of the residual that a whole step must take away to be taken for that alone.
+const RESIDUAL_LOST: f64 = 0.5;
 /// Part of the slope that may remain.
 const SLOPE_LEFT: f64 = 0.5;
 /// Part of the step at which the search for it ends.
@@ -152,7 +157,7 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             let change = equations.size(correction, -1.0, &step);
             let trust = equations.size(last, 0.0, last) * equations.size(correction, 0.0, correction) * last_factor
                 / (change * length);
-            if limits.test == Test::Monotone && trust.is_finite() {
+            if limits.test != Test::Slope && trust.is_finite() {
                 factor = trust.clamp(limits.damping, 1.0);
             }
         }
@@ -200,7 +205,10 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             // c - (1 - f) d is the part of the correction that is due to curvature
             let curvature = equations.size(&correction, factor - 1.0, &step);
             let better = (0.5 * length * factor * factor / curvature).min(1.0);
-            if theta < 1.0 - 0.25 * factor || then.converged() {
+            let lower = limits.test == Test::MonotoneOrLower
+                && !now.outstanding
+                && then.residual < (1.0 - RESIDUAL_LOST * factor) * now.residual;
+            if theta < 1.0 - 0.25 * factor || lower || then.converged() {
                 let longer = better >= 4.0 * factor && accepted.is_none();
                 accepted = Some((trial, then, correction, factor));
                 if !longer {

@@ -21,7 +21,7 @@ pub struct Options {
 }
 
 /// The names of faces that the mesh of a face has beside its sides; `midline` only a half, those in `.R` only a whole face.
-pub const FACES: [&str; 14] = [
+pub const FACES: [&str; 15] = [
     "skin",
     "deep",
     "rim",
@@ -33,6 +33,7 @@ pub const FACES: [&str; 14] = [
     "lid.lower.L",
     "lid.lower.R",
     "deep.perioral",
+    "deep.nose",
     "deep.sliding",
     "deep.eye.L",
     "deep.eye.R",
@@ -238,6 +239,8 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
         add("deep", deep);
         if eye && (row == EYE_ROW || row + 1 == EYE_ROW) {
             add(&format!("deep.eye.{letter}"), deep);
+        } else if NOSE.0.contains(&row) && column < NOSE.1 {
+            add("deep.nose", deep);
         } else if PERIORAL.0.contains(&row) && column < PERIORAL.1 {
             add("deep.perioral", deep);
         } else {
@@ -276,5 +279,7 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
     all
 }
 
+/// Rows and columns (from the midline) of the tissue on bone and cartilage of the nose.
+const NOSE: (std::ops::Range<usize>, usize) = (8..14, 3);
 /// Rows and columns (from the midline) of the tissue that lies on teeth and jaws: from the chin to the base of the nose.
-const PERIORAL: (std::ops::Range<usize>, usize) = (2..9, 5);
+const PERIORAL: (std::ops::Range<usize>, usize) = (2..8, 5);

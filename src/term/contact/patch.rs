@@ -197,7 +197,7 @@ fn blossom(b: [Vector; 4], arguments: [f64; 3]) -> Vector {
 }
 
 /// The cubic Bernstein polynomials at x, their first and their second derivatives.
-fn bernstein(x: f64) -> [[f64; 4]; 3] {
+pub(super) fn bernstein(x: f64) -> [[f64; 4]; 3] {
     let y = 1.0 - x;
     [
         [y * y * y, 3.0 * x * y * y, 3.0 * x * x * y, x * x * x],

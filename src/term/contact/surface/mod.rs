@@ -3,12 +3,14 @@
 //! g(x) > 0 on the free side. dg/dx = n is the unit normal towards the free side, d2g/dx2 its curvature; n . d2g/dx2 = 0.
 //! To add a surface: one file here, its line in the scene, and its case in the conformance tests.
 
+mod arch;
 mod capsule;
 mod cylinder;
 mod patches;
 mod plane;
 mod sphere;
 
+pub use arch::Arch;
 pub use capsule::Capsule;
 pub use cylinder::Cylinder;
 pub use patches::Patches;

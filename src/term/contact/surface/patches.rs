@@ -43,9 +43,18 @@ impl Patches {
                     .over([-beyond[0], 1.0 + beyond[1]], [-beyond[2], 1.0 + beyond[3]])
             })
             .collect();
+        Patches::of(patches, free.sign())
+    }
+
+    /// A single patch whose outward side is free.
+    pub(super) fn one(patch: Patch) -> Patches {
+        Patches::of(vec![patch], 1.0)
+    }
+
+    fn of(patches: Vec<Patch>, sign: f64) -> Patches {
         let bounds = |(index, patch): (usize, &Patch)| GeomWithData::new(patch.bounds(), index);
         let boxes = patches.iter().enumerate().map(bounds);
-        Patches { tree: RTree::bulk_load(boxes.collect()), patches, sign: free.sign() }
+        Patches { tree: RTree::bulk_load(boxes.collect()), patches, sign }
     }
 }
 
