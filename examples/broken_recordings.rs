@@ -55,10 +55,71 @@ fn main() -> std::io::Result<()> {
         }),
         ("another_schema.mcap", whole(&[foreign])),
     ];
-    for (name, bytes) in files {
+    let placed = |at: fn(u64, &str, [f64; 3]) -> [f64; 3]| whole(&[eight(|_, label| label, at)]);
+    let called = |label: fn(&str) -> &str| whole(&[eight(|_, l| label(l), |_, _, position| position)]);
+    let registered = [
+        ("eight.mcap", placed(|_, _, position| position)),
+        ("left_handed.mcap", placed(|_, _, [x, y, z]| [x, -y, z])),
+        ("turned.mcap", placed(|_, _, [x, y, z]| [0.03 - y, x, z + 0.01])),
+        (
+            "moving_at_first.mcap",
+            placed(
+                |frame, label, [x, y, z]| {
+                    if frame == 0 && label.starts_with("lip") { [x + 0.002, y, z + 0.002] } else { [x, y, z] }
+                },
+            ),
+        ),
+        (
+            "sides_exchanged.mcap",
+            called(|label| match label {
+                "brow.L" => "brow.R",
+                "brow.R" => "brow.L",
+                "cheek.L" => "cheek.R",
+                "cheek.R" => "cheek.L",
+                "lip.L" => "lip.R",
+                "lip.R" => "lip.L",
+                middle => middle,
+            }),
+        ),
+        (
+            "two_labels_exchanged.mcap",
+            called(|label| match label {
+                "nose" => "lip.L",
+                "lip.L" => "nose",
+                other => other,
+            }),
+        ),
+    ];
+    for (name, bytes) in files.into_iter().chain(registered) {
         std::fs::write(folder.join(name), bytes)?;
     }
     Ok(())
+}
+
+/// Labels and positions of the recordings that do not lie on their model, m: nearly symmetric about y = 5 mm.
+const EIGHT: [(&str, [f64; 3]); 8] = [
+    ("brow.L", [0.010, 0.000, 0.008]),
+    ("brow.R", [0.010, 0.010, 0.0086]),
+    ("cheek.L", [0.020, 0.0015, 0.010]),
+    ("cheek.R", [0.020, 0.0081, 0.010]),
+    ("lip.L", [0.030, 0.000, 0.005]),
+    ("lip.R", [0.030, 0.010, 0.0058]),
+    ("nose", [0.022, 0.005, 0.010]),
+    ("chin", [0.040, 0.0052, 0.002]),
+];
+
+/// The topic of the eight markers, called and placed as given.
+fn eight(
+    called: impl for<'l> Fn(u64, &'l str) -> &'l str,
+    placed: impl Fn(u64, &str, [f64; 3]) -> [f64; 3],
+) -> Topic {
+    let message = |frame: u64| {
+        let time = START_NS + frame * STEP_NS;
+        let markers = EIGHT.map(|(label, at)| Ros2Marker::named(called(frame, label), placed(frame, label, at)));
+        let payload = ros2_message(false, false, time as i64, &markers);
+        Message { log_time: time, publish_time: time, payload }
+    };
+    Topic::ros2(false, (0..FRAMES).map(message).collect())
 }
 
 /// The topic of the markers; `position` may move them.

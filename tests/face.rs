@@ -483,6 +483,49 @@ fn a_muscle_pulls_the_corner_of_the_mouth_to_its_origin() {
     assert_eq!(found.negative_modes, Some(0));
 }
 
+/// The face as in problems/smile with all muscles of the left side.
+fn all_muscles() -> Scene {
+    let text = std::fs::read_to_string("problems/smile/problem.toml").unwrap();
+    let face = built_in_face();
+    let names: Vec<String> = face.muscles.iter().map(|m| format!("\"{}\"", m.name)).collect();
+    let fixed = face.muscles.iter().filter(|m| !m.origin.is_empty()).map(|m| format!("\"{}\"", m.name));
+    let (names, fixed) = (names.join(", "), fixed.collect::<Vec<_>>().join(", "));
+    let four = "[\"zygomaticus_major\", \"zygomaticus_minor\", \"risorius\", \"levator_labii_superioris\"]";
+    let text = text.replace(&format!("face = {four}"), &format!("face = [{names}]"));
+    let text = text.replace(&format!("origin = {four}"), &format!("origin = [{fixed}]"));
+    let (head, tail) = text.split_once("[controls]").unwrap();
+    let text = format!("{head}\n[[probe]]{}", tail.split_once("[[probe]]").unwrap().1);
+    parse(&text, &[]).unwrap()
+}
+
+#[test]
+fn each_muscle_alone_draws_its_insertion_to_its_origin() {
+    let scene = all_muscles();
+    let built = build(&scene).unwrap();
+    let mesh = built.model.mesh();
+    let face = built_in_face();
+    let locator = Locator::new(mesh);
+    println!("muscle at 1 %: towards its origin mm, of mm, iterations");
+    for (k, muscle) in built.model.controls().iter().enumerate() {
+        let mut solver = Solver::new(&built.model, Settings::default()).unwrap();
+        let mut controls = vec![0.0; built.model.controls().len()];
+        controls[k] = 0.01;
+        let found = solver.equilibrium(&built.model.rest(), &Drive { controls, load: 1.0 });
+        let found = found.unwrap_or_else(|failure| panic!("{}: {}", muscle.name, failure.error));
+        let course = face.muscle(muscle.name.trim_end_matches(".L")).unwrap();
+        let at = |p: [f64; 3]| face.sheet.at(p[0], p[1], p[2]).position;
+        let (first, last) = (course.path[0], course.path[course.path.len() - 1]);
+        let moved = |x: Vector| {
+            mesh.interpolate(locator.locate(x).unwrap_or_else(|_| panic!("{x:?} is outside")), &found.state.u)
+        };
+        let u = moved(at(last));
+        let pull = normalised(subtract(at(first), at(last)));
+        let steps: usize = found.history.iter().map(|step| step.iterations.len()).sum();
+        println!("{:42} {:6.2} {:6.2} {steps:4} {u:.2?}", muscle.name, dot(u, pull), norm(u));
+        assert_eq!(found.negative_modes, Some(0), "{}", muscle.name);
+    }
+}
+
 #[test]
 fn a_face_is_read_expanded_and_locked() {
     let text = HALF_FACE.replace("half = true", "layers = 2, halved = true").replace("side = \"L\"\n", "");

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
     ActivationSpec, BlockSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec,
-    LawSpec, LoadKind, PartSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
+    LawSpec, LoadKind, PartSpec, RegisterSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -62,9 +62,13 @@ topic = "/markers"
 sensitivity = "finite-difference"
 unknowns = ["slab"]
 frames = { last = 9 }
+register = "rigid"
+neutral = 3
+axes = ["-x", "z", "y"]
 
 [[marker]]
 name = "M01"
+label = "marker 1"
 position_mm = [30, 10, 20]
 
 [solver]
@@ -106,7 +110,13 @@ fn a_whole_file_means_what_it_says() {
     assert_eq!(scene.controls[0].value, ControlValue::Constant(0.05));
     assert_eq!((scene.controls[0].place.column, scene.controls[0].place.length), (1, 10));
     let fit = scene.fit.as_ref().unwrap();
-    assert_eq!((fit.units, fit.unknowns.as_slice(), fit.frames.last), (Units::M, &["slab".to_string()][..], Some(9)));
+    assert_eq!(
+        (fit.units, fit.unknowns.as_slice(), fit.frames.last),
+        (Some(Units::M), &["slab".to_string()][..], Some(9))
+    );
+    assert_eq!((fit.registration.register, fit.registration.neutral), (RegisterSpec::Rigid, Some(3)));
+    assert_eq!(fit.registration.axes.map(|axis| axis.word()), ["-x", "z", "y"]);
+    assert_eq!((scene.markers[0].name.as_str(), scene.markers[0].label.as_str()), ("M01", "marker 1"));
     assert!(fit.markers.is_absolute() && fit.markers.ends_with("smile/smile.mcap"));
     assert_eq!((scene.solver.step_min, scene.solver.step_max), (1e-3, 1.0));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
@@ -211,6 +221,10 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     );
     expect("last = 9", "first = 10, last = 9", "C005", "9", "at least first = 10");
     expect("name = \"tip\"", "name = \"\"", "C005", "\"\"", "a name");
+    expect("units = \"m\"", "units = \"estimate\"", "C005", "\"estimate\"", "register is not \"similarity\"");
+    expect("\"-x\", \"z\"", "\"-y\", \"z\"", "C005", "[\"-y\"", "each of x, y, z once");
+    expect("neutral = 3", "neutral = -3", "C005", "-3", "a whole number from 0");
+    expect("neutral = 3", "neutral = \"last\"", "C006", "\"last\"", "it can be \"first\"");
     // C006 unknown choice
     expect(
         "kind = \"fit\"",
@@ -350,7 +364,7 @@ fn overrides_are_merged_before_anything_is_checked() {
     assert_eq!(set(&["controls.slab=0.1"]).controls[1].name, "slab");
     assert_eq!(block(&set(&["mesh.block.elements[0]=12"])).elements, [12, 2, 2]);
     assert_eq!(block(&set(&["mesh.block.elements=[3,1,1]"])).elements, [3, 1, 1]);
-    assert_eq!(set(&["fit.units=mm"]).fit.unwrap().units, Units::Mm);
+    assert_eq!(set(&["fit.units=mm"]).fit.unwrap().units, Some(Units::Mm));
     assert_eq!(set(&["output.every=2", "output.every=3"]).output.every, 3);
     assert!(set(&["output.estimate=true"]).output.estimate && !set(&[]).output.estimate);
     // A value of the command line may mend the file.

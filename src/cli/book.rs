@@ -9,6 +9,7 @@ use super::telling::Telling;
 use super::terminal::print;
 use crate::error::{Result, Warning};
 use crate::fit::advise::MarkerHelp;
+use crate::fit::registration::Registration;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::model::Model;
@@ -120,11 +121,10 @@ impl<'a> Book<'a> {
     pub fn finish(
         mut self,
         scene: &Scene,
-        fit: &Fit<'_>,
+        (fit, registration): (&Fit<'_>, &Registration),
         work: &Work,
         run: &Run,
-        meter: &mut Meter,
-        flags: &Flags,
+        (meter, flags): (&mut Meter, &Flags),
     ) -> Result<Tally> {
         if let Some((frame, warning)) = self.telling.warning() {
             self.tally.warn(frame, vec![warning], meter, flags);
@@ -134,6 +134,7 @@ impl<'a> Book<'a> {
         let controls: Vec<&str> = self.labels.iter().map(String::as_str).collect();
         let summary = FitSummary {
             name: &scene.name,
+            recording: &registration.to_string(),
             controls: &controls,
             bones: !self.model.bones().is_empty(),
             frames: &self.fitted,

@@ -75,7 +75,7 @@ pub(super) fn describe(scene: &Scene, model: &Model, halved: Option<&Halved>) ->
 }
 
 /// What a fit will use of its recording, and what is missing there.
-fn describe_clip(Clip { recording, frames, markers }: &Clip) -> String {
+fn describe_clip(Clip { recording, registration, frames, markers, .. }: &Clip) -> String {
     let health = &recording.health;
     let labels: Vec<_> = markers.iter().map(|marker| &health.labels[marker.column]).collect();
     let missing = labels.iter().fold(Missing::default(), |sum, label| sum.plus(label.missing));
@@ -97,5 +97,5 @@ fn describe_clip(Clip { recording, frames, markers }: &Clip) -> String {
     if missing.total() > 0 {
         text += &format!(": {missing}");
     }
-    text + &format!("\n  the farthest marker is placed {farthest:.3} mm from the surface\n")
+    text + &format!("\n  the farthest marker is placed {farthest:.3} mm from the surface\n{registration}")
 }

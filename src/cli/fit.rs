@@ -9,11 +9,14 @@ use super::progress::Meter;
 use super::run::{Run, Tally};
 use crate::cli::diagnostics::render_error;
 use crate::error::{Result, Warning};
+use crate::fit::placement::Marker;
+use crate::fit::registration::Registration;
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::markers::Recording;
 use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
+use crate::report::tables::{Placement, write_registration};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
 
@@ -22,7 +25,7 @@ pub(super) fn fit(
     scene: &Scene,
     spec: &FitSpec,
     prepared: &Prepared,
-    Clip { recording, frames, .. }: &Clip,
+    Clip { recording, registration, frames, .. }: &Clip,
     (run, flags): (&Run, &Flags),
     (checkpoints, left): (&Checkpoints, Option<Left>),
     work: &mut Work,
@@ -30,6 +33,7 @@ pub(super) fn fit(
     let built = &prepared.built;
     let probes = probes(scene, built);
     let mut fit = Fit::new(&built.model, scene, spec, recording)?;
+    write_registration(&run.folder, &placements(fit.markers(), registration))?;
     let record = Record::create(&run.folder, &built.model, &probes, &scene.output, true)?;
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
     let estimates = Estimates::new(prepared, settings(scene), placed)?;
@@ -103,7 +107,7 @@ pub(super) fn fit(
         smooth(&mut fit, recording, (frames, &passed), &mut book, run, (&mut meter, flags))?;
     }
     *work = fit.work();
-    book.finish(scene, &fit, work, run, &mut meter, flags)
+    book.finish(scene, (&fit, registration), work, run, (&mut meter, flags))
 }
 
 /// Smooths the clip and writes its frames; those of the pass before where that fails.
@@ -151,4 +155,16 @@ fn smooth(
         book.frame(estimate, fit, Beside::Fresh(fit), meter, flags)?;
     }
     Ok(())
+}
+
+/// Where each marker sits, and how the neutral frame fits there.
+fn placements<'m>(markers: &'m [Marker], registration: &Registration) -> Vec<Placement<'m>> {
+    let shown = |m: &Marker| registration.markers.iter().find(|registered| registered.name == m.name);
+    let placement = |m: &'m Marker| Placement {
+        name: &m.name,
+        skin_mm: m.distance,
+        neutral_mm: shown(m).map(|registered| registered.distance_mm),
+        counted: shown(m).is_some_and(|registered| !registered.off),
+    };
+    markers.iter().map(placement).collect()
 }

@@ -6,8 +6,11 @@
 mod advise;
 mod book;
 mod check;
+mod completions;
 pub mod diagnostics;
 mod estimate;
+mod explain;
+mod export;
 mod fibres;
 mod fit;
 mod forward;
@@ -29,8 +32,10 @@ use diagnostics::{Colour, render_error, render_warning};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use crate::error::explain::Page;
 use crate::error::{Error, Result, Warning};
 use crate::fit::advise::Criterion;
+use crate::report::export::Format;
 
 /// Finds out which muscles moved a face.
 ///
@@ -86,13 +91,35 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// What is in a marker recording
+    /// What is in a marker recording, or in the folder of a run
     Inspect {
-        /// An MCAP file
+        /// An MCAP file, or a folder
         file: PathBuf,
         /// As JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Write a finished run for other programs; nothing is solved again
+    Export {
+        /// The folder of a run
+        run: PathBuf,
+        /// Formats, with commas between them
+        #[arg(long, value_enum, value_delimiter = ',', required = true)]
+        to: Vec<Format>,
+        /// The frame for formats of one frame [default: the one that moved most]
+        #[arg(long, value_name = "N")]
+        frame: Option<usize>,
+    },
+    /// What the code of a message means, and what to do; without one, a list of all
+    Explain {
+        /// For example S003
+        #[arg(value_parser = explain::code)]
+        code: Vec<Page>,
+    },
+    /// A script that completes commands and flags: risorius completions bash > ~/.local/share/bash-completion/completions/risorius
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
     },
 }
 
@@ -233,9 +260,16 @@ pub fn main() -> ExitCode {
         Ok(ending) => ExitCode::from(ending.exit_code()),
         Err(error) => {
             terminal::tell(&render_error(&error, colour));
+            terminal::tell(&more_about(error.mistakes().iter().map(Error::code)));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Where the pages of codes are.
+fn more_about<'c>(codes: impl Iterator<Item = &'c str>) -> String {
+    let codes: std::collections::BTreeSet<&str> = codes.collect();
+    format!("\nmore: risorius explain {}\n", codes.into_iter().collect::<Vec<_>>().join(" "))
 }
 
 /// `risorius problem.toml` lacks a command; the message says which.
@@ -276,5 +310,8 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
             advise::run(&advise::Question { path: problem, markers, criterion, apart_mm, json }, &cli.flags)
         }
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
+        Some(Command::Export { run, to, frame }) => export::export(run, to, *frame, &cli.flags),
+        Some(Command::Explain { code }) => explain::explain(code),
+        Some(Command::Completions { shell }) => completions::completions(*shell),
     }
 }

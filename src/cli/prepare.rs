@@ -2,8 +2,9 @@
 
 use super::problem::{Source, recording_warnings};
 use crate::error::{Error, Result, Warning};
-use crate::fit::placement::{Marker, check_units, place};
+use crate::fit::placement::{Marker, place};
 use crate::fit::recording::chosen_frames;
+use crate::fit::registration::{Registration, register};
 use crate::markers::Recording;
 use crate::model::build::{Built, build, host};
 use crate::model::halved::Halved;
@@ -21,10 +22,13 @@ pub(super) struct Prepared {
 
 /// A recording on a model.
 pub(super) struct Clip {
+    /// In the coordinates of the model.
     pub recording: Recording,
+    pub registration: Registration,
     /// The frames to fit.
     pub frames: Vec<usize>,
     pub markers: Vec<Marker>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Builds the model and places the recording on it.
@@ -42,7 +46,7 @@ pub(super) fn prepare(source: &Source) -> Result<Prepared> {
         (Ok(built), Ok(clip)) => {
             let mut warnings = scene.warnings.clone();
             warnings.extend(built.warnings.iter().cloned());
-            warnings.extend(clip.iter().flat_map(|clip| recording_warnings(&clip.recording)));
+            warnings.extend(clip.iter().flat_map(|clip| clip.warnings.iter().cloned()));
             let halved = scene.output.estimate.then(|| Halved::new(scene, &built.model));
             let halved = halved.and_then(|halved| halved.map_err(|warning| warnings.push(*warning)).ok());
             Ok(Prepared { built, clip, halved, warnings })
@@ -55,18 +59,22 @@ pub(super) fn prepare(source: &Source) -> Result<Prepared> {
 }
 
 fn clip(source: &Source, scene: &Scene, fit: &FitSpec) -> Result<Clip> {
-    let recording = source.recording(fit)?;
+    let mut recording = source.recording(fit)?;
+    let mut warnings = recording_warnings(&recording);
     let frames = chosen_frames(fit, &recording);
-    let markers = match host(&scene.mesh) {
-        Ok(mesh) => place(scene, fit, &mesh, &recording)
-            .and_then(|markers| check_units(&markers, &mesh, &recording, fit).map(|()| markers)),
+    let placed = match host(&scene.mesh) {
+        Ok(mesh) => place(scene, fit, &mesh, &recording).and_then(|markers| {
+            let (registration, odd) = register(scene, fit, &mesh, &markers, &mut recording)?;
+            warnings.extend(odd);
+            Ok((markers, registration))
+        }),
         // building the model tells what is wrong with the host
         Err(_) => Err(Error::Mistakes(Vec::new())),
     };
-    match (frames, markers) {
-        (Ok(frames), Ok(markers)) => Ok(Clip { recording, frames, markers }),
-        (frames, markers) => {
-            let mistakes = [frames.err(), markers.err()].into_iter().flatten();
+    match (frames, placed) {
+        (Ok(frames), Ok((markers, registration))) => Ok(Clip { recording, registration, frames, markers, warnings }),
+        (frames, placed) => {
+            let mistakes = [frames.err(), placed.err()].into_iter().flatten();
             Err(Error::all(mistakes.flat_map(Error::into_mistakes).collect()))
         }
     }

@@ -5,7 +5,7 @@ use super::prepare::{Prepared, prepare};
 use super::problem::Source;
 use super::progress::Meter;
 use super::terminal::tell;
-use super::{Ending, Flags, fibres, fit, forward, study};
+use super::{Ending, Flags, fibres, fit, forward, more_about, study};
 use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
@@ -201,9 +201,10 @@ pub(super) fn finish(
                     tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n"))
                 }
                 Ending::NotConverged => tell(&format!(
-                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json)\n",
+                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json){}",
                     failed.len(),
-                    frames_ok + failed.len()
+                    frames_ok + failed.len(),
+                    more_about(failed.iter().map(|frame| frame.code.as_str()))
                 )),
                 Ending::Ok | Ending::Warned => {}
             }

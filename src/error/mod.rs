@@ -1,11 +1,13 @@
 //! The one error type. Every variant has a stable code, carries the numbers a reader needs, and a remedy.
 //!
 //! Codes: `C` problem file, `M` recording, `K` markers against the model, `G` geometry, `S` solver, `F` fit,
-//! `O` output. A code never changes its meaning; a retired code is not used again.
+//! `O` output. A code never changes its meaning; a retired code is not used again. Every code has a page in [`explain`].
 
+pub mod explain;
 mod likely;
 mod place;
 mod recording;
+mod registration;
 mod remedy;
 
 use std::path::PathBuf;
@@ -14,6 +16,7 @@ pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
 use recording::{encapsulation_name, list_topics};
+pub use registration::{Cause, Misregistration};
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;
@@ -361,8 +364,8 @@ pub enum Error {
         labels: usize,
         /// The unit in the problem file.
         declared: &'static str,
-        /// The unit that would explain the ratio.
-        likely: &'static str,
+        /// The unit that would explain the ratio, if one does.
+        likely: Option<&'static str>,
         /// The unit in the problem file.
         place: Box<Place>,
     },
@@ -404,6 +407,9 @@ pub enum Error {
         /// The marker in the problem file.
         place: Box<Place>,
     },
+    /// The recording does not lie on the model.
+    #[error("{0}")]
+    Misregistered(Box<Misregistration>),
     // ---- G: geometry ----------------------------------------------------------------------------------
     /// The reference geometry of the host is inverted.
     #[error("the mesh is inverted: element {element} at xi ({:.3}, {:.3}, {:.3}) has det(dX/dxi) = {det:.3e} mm3", xi[0], xi[1], xi[2])]
@@ -771,6 +777,38 @@ pub enum Error {
         /// What is in it.
         entries: usize,
     },
+    /// A folder is not that of a run which can be looked at.
+    #[error("{} is not the folder of a run: it lacks {lacks}", path.display())]
+    NotARun {
+        /// The folder.
+        path: PathBuf,
+        /// What is not there.
+        lacks: &'static str,
+    },
+    /// A run has kept no shapes.
+    #[error("the run in {} has kept no shape of any frame (view/result_<frame>.exf)", path.display())]
+    NoShapes {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file in the folder of a run is not as the run wrote it.
+    #[error("{} is not what a run wrote: {message}", path.display())]
+    DamagedRun {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: Box<str>,
+    },
+    /// A run has no shape of the frame asked for.
+    #[error("the run in {} has no shape of frame {frame}: it has {kept}", path.display())]
+    NoSuchShape {
+        /// The folder.
+        path: PathBuf,
+        /// The frame asked for.
+        frame: usize,
+        /// The frames it has.
+        kept: Box<str>,
+    },
 }
 
 impl Error {
@@ -831,6 +869,7 @@ impl Error {
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
             Error::NoSuchFrame { .. } => "K004",
+            Error::Misregistered(wrong) => wrong.code(),
             Error::InvertedMesh { .. } => "G001",
             Error::MuscleOutside(_) => "G002",
             Error::InvertedMuscle { .. } => "G003",
@@ -869,6 +908,10 @@ impl Error {
             Error::BadCheckpoint { .. } => "C027",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
+            Error::NotARun { .. } => "O003",
+            Error::NoShapes { .. } => "O004",
+            Error::DamagedRun { .. } => "O005",
+            Error::NoSuchShape { .. } => "O006",
         }
     }
 
@@ -915,6 +958,7 @@ impl Error {
             | Error::NoAxes { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
+            Error::Misregistered(wrong) => Some(&wrong.place),
             Error::Named(named) => Some(&named.1),
             _ => None,
         }

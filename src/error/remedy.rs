@@ -59,7 +59,13 @@ impl Error {
                 Some("record with a ROS 2 middleware that writes plain CDR, as rosbag2 does by default".into())
             }
             Error::FrameShape { .. } => Some("give every frame one position, or `None`, per label".into()),
-            Error::UnitsLookWrong { likely, .. } => Some(format!("the data fit units = \"{likely}\"")),
+            Error::UnitsLookWrong { likely: Some(likely), .. } => Some(format!("the data fit units = \"{likely}\"")),
+            Error::UnitsLookWrong { likely: None, .. } => Some(
+                "none of mm, cm, m explains it: do the labels belong to these markers? data without a true size want units = \
+                 \"estimate\" and register = \"similarity\""
+                    .into(),
+            ),
+            Error::Misregistered(wrong) => Some(wrong.help()),
             Error::UnknownLabel { nearest: Some(nearest), .. } => Some(format!("did you mean `{nearest}`?")),
             Error::UnknownLabel { .. } => Some("rename the marker, or remove it from the problem".into()),
             Error::MarkerFarFromSurface { foot, .. } => Some(format!(
@@ -172,6 +178,10 @@ impl Error {
             Error::FolderNotEmpty { .. } => {
                 Some("choose another --out, or add --force to replace the run that is in it".into())
             }
+            Error::NotARun { .. } => Some("name the folder that a run printed, for example runs/beam-0001".into()),
+            Error::NoShapes { .. } => Some("run again with view = true in [output]".into()),
+            Error::DamagedRun { .. } => Some("run again: `risorius run` on its problem.lock.toml".into()),
+            Error::NoSuchShape { .. } => Some("choose one of these, or run again with every = 1 in [output]".into()),
         }
     }
 }

@@ -6,9 +6,9 @@
 //! [`objective`] has the rest.
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
-//! ([`sensitivity`]). Frames follow each other warm ([`sequence`]), and may then be smoothed all
-//! at once ([`smoother`]); [`covariance`] and
-//! [`identifiability`] say how far an answer can be believed, [`advise`] which further markers would tell more.
+//! ([`sensitivity`]). Before the first, the recording is brought to the model ([`registration`]). Frames follow each other
+//! warm ([`sequence`]), and may then be smoothed all at once ([`smoother`]); [`covariance`] and [`identifiability`] say how far
+//! an answer can be believed, [`advise`] which further markers would tell more.
 
 pub mod advise;
 pub mod bias;
@@ -22,6 +22,7 @@ pub mod objective;
 mod observed;
 pub mod placement;
 pub mod recording;
+pub mod registration;
 pub mod sensitivity;
 pub mod sequence;
 pub mod smoother;

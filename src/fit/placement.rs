@@ -1,7 +1,9 @@
 //! Markers on the model: from a name and a position in the problem to a material point and a label of the recording.
 
+use super::registration::neutral_frame;
 use crate::error::{Error, Place, Result};
 use crate::markers::Recording;
+use crate::math::motion::{Pair, spread};
 use crate::mesh::surface::Surface;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{FitSpec, Scene, Units};
@@ -30,9 +32,9 @@ pub fn place(scene: &Scene, fit: &FitSpec, mesh: &Mesh, recording: &Recording) -
     let mut markers = Vec::new();
     let mut mistakes = Vec::new();
     for spec in &scene.markers {
-        let column = recording.labels.iter().position(|label| *label == spec.name);
+        let column = recording.labels.iter().position(|label| *label == spec.label);
         if column.is_none() {
-            mistakes.push(unknown_label(&spec.name, &recording.labels, &spec.place));
+            mistakes.push(unknown_label(&spec.label, &recording.labels, &spec.place));
         }
         let Some(foot) = surface.project(spec.position_mm) else { continue };
         if foot.distance > fit.max_marker_distance_mm {
@@ -68,50 +70,44 @@ fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
     Error::UnknownLabel { name: name.into(), labels: list.into(), nearest, place: Box::new(place.clone()) }
 }
 
-/// Compares the size of the marker cloud in the recording with the model's: a ratio near a power of ten that another unit
-/// explains is an error. The size is the root mean square distance from the centre over the markers that are present.
+/// Compares the size of the marker cloud in the recording with the model's, in the first of the frames that show the most
+/// markers.
+///
+/// # Errors
+/// As [`units_against`].
+pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: &FitSpec) -> Result<()> {
+    let frame = neutral_frame(fit, markers, recording)?;
+    let Some(shown) = recording.frames.get(frame) else { return Ok(()) };
+    let pair = |m: &Marker| shown.positions_mm[m.column].map(|z| (z, mesh.position(m.point)));
+    let pairs: Vec<Pair> = markers.iter().filter_map(pair).collect();
+    // a size that was estimated has been brought to the model's by now
+    units_against(&pairs, fit.units.unwrap_or(Units::Mm), fit)
+}
+
+/// Compares the sizes of the two sides of pairs of (recording, model): a ratio far from one is a wrong unit. The size is the
+/// root mean square distance from the centre.
 ///
 /// # Errors
 /// [`Error::UnitsLookWrong`].
-pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: &FitSpec) -> Result<()> {
-    let model: Vec<[f64; 3]> = markers.iter().map(|m| mesh.position(m.point)).collect();
-    // the frame that shows the most markers
-    let present =
-        |k: &usize| markers.iter().filter(|m| recording.frames[*k].positions_mm[m.column].is_some()).count();
-    let Some(best) = (0..recording.frames.len()).rev().max_by_key(present) else { return Ok(()) };
-    let pairs: Vec<([f64; 3], [f64; 3])> = markers
-        .iter()
-        .zip(model)
-        .filter_map(|(m, x)| recording.frames[best].positions_mm[m.column].map(|z| (x, z)))
-        .collect();
+pub fn units_against(pairs: &[Pair], units: Units, fit: &FitSpec) -> Result<()> {
     if pairs.len() < 2 {
         return Ok(());
     }
-    let ratio = spread(pairs.iter().map(|p| p.1)) / spread(pairs.iter().map(|p| p.0));
+    let size = |points: Vec<[f64; 3]>| spread(&points);
+    let ratio = size(pairs.iter().map(|p| p.0).collect()) / size(pairs.iter().map(|p| p.1).collect());
     // a body does not grow or shrink threefold, and no two units lie closer
     if !ratio.is_finite() || (1.0 / 3.0..3.0).contains(&ratio) {
         return Ok(());
     }
     // the unit u for which ratio / in_mm(declared) x in_mm(u) is nearest to one
-    let off = |units: Units| (ratio / fit.units.mm() * units.mm()).log10().abs();
-    let likely = [Units::Mm, Units::Cm, Units::M].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
+    let off = |other: Units| (ratio / units.mm() * other.mm()).log10().abs();
+    let likely = Units::ALL.into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
     Err(Error::UnitsLookWrong {
         ratio,
         labels: pairs.len(),
-        declared: fit.units.name(),
-        likely: likely.unwrap_or(fit.units).name(),
+        declared: units.name(),
+        // a unit that leaves the sizes more than twofold apart explains nothing
+        likely: likely.filter(|likely| off(*likely) < 0.3).map(Units::name),
         place: Box::new(fit.units_place.clone()),
     })
-}
-
-fn spread(points: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {
-    let count = points.clone().count() as f64;
-    let mut centre = [0.0; 3];
-    for p in points.clone() {
-        for (c, p) in centre.iter_mut().zip(p) {
-            *c += p / count;
-        }
-    }
-    let square = |p: [f64; 3]| -> f64 { p.iter().zip(centre).map(|(p, c)| (p - c) * (p - c)).sum() };
-    (points.map(square).sum::<f64>() / count).sqrt()
 }

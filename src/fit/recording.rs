@@ -2,13 +2,14 @@
 
 use crate::error::{Error, Result};
 use crate::markers::{self, ReadOptions, Recording};
-use crate::scene::{FitSpec, FramesSpec};
+use crate::scene::{FitSpec, FramesSpec, Units};
 
 /// How a fit wants its recording read.
 pub fn options(fit: &FitSpec) -> ReadOptions {
     ReadOptions {
         topic: fit.topic.clone(),
-        units: fit.units,
+        // where the unit is to be estimated, positions stay in that of the file
+        units: fit.units.unwrap_or(Units::Mm),
         zero_is_missing: fit.zero_is_missing,
         allow_truncated: fit.allow_truncated,
         allow_unchecked: fit.allow_unchecked,

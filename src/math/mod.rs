@@ -6,6 +6,7 @@
 pub mod block_tridiagonal;
 pub mod factor;
 pub mod lanes;
+pub mod motion;
 pub mod normal;
 pub mod ordering;
 pub mod quadrature;

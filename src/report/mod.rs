@@ -14,10 +14,12 @@
 //! readable.
 
 pub mod exf;
+pub mod export;
 pub mod fibres;
 pub mod frame;
 pub mod machine;
 pub mod manifest;
+pub mod playback;
 pub mod pvd;
 pub mod record;
 pub mod run_folder;

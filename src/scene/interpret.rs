@@ -8,9 +8,9 @@ use super::face;
 use super::nearest::nearest;
 use super::objectives;
 use super::references::References;
+use super::registration::{self, MOST_FRAMES};
 use super::spec::*;
 use super::tree::{Node, Value};
-use super::units::Units;
 use crate::error::Error;
 use crate::math::factor::Precision;
 use crate::mesh::facial::FACES;
@@ -505,14 +505,16 @@ fn marker(table: &mut Table) -> Option<MarkerSpec> {
     let name = table.required("name", "name = \"M01\"", |item| item.name());
     let position_mm = table.required("position_mm", "position_mm = [30, 10, 20]", |item| item.numbers(FINITE));
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
-    Some(MarkerSpec { name: name?, position_mm: position_mm?, sd_mm: sd_mm?, place: table.place() })
+    let label = table.optional("label", |item| item.name());
+    let (name, label) = (name?, label?);
+    let label = label.unwrap_or_else(|| name.clone());
+    Some(MarkerSpec { name, label, position_mm: position_mm?, sd_mm: sd_mm?, place: table.place() })
 }
 
 fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
     let markers_place = table.place_of("markers");
-    let units = Units::ALL.map(|units| (units.name(), units));
-    let units = table.required("units", "units = \"m\"", |item| item.choice(&units, &[]));
+    let units = table.required("units", "units = \"m\"", registration::units);
     let units_place = table.place_of("units");
     let topic = table.optional("topic", |item| item.name());
     let sensitivities =
@@ -535,6 +537,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let frames_place = table.place_of("frames");
+    let registration = registration::registration(table, units);
     let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
     let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
@@ -552,6 +555,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         objectives: objectives?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
+        registration: registration?,
         tolerance: tolerance?,
         max_iterations: max_iterations?,
         finite_difference_step: finite_difference_step?,
@@ -563,10 +567,9 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
 }
 
 fn frames(table: &mut Table) -> Option<FramesSpec> {
-    const MOST: usize = 1_000_000_000;
-    let first = table.or("first", 0, |item| item.whole(0, MOST));
-    let last = table.optional("last", |item| item.whole(0, MOST));
-    let step = table.or("step", 1, |item| item.whole(1, MOST));
+    let first = table.or("first", 0, |item| item.whole(0, MOST_FRAMES));
+    let last = table.optional("last", |item| item.whole(0, MOST_FRAMES));
+    let step = table.or("step", 1, |item| item.whole(1, MOST_FRAMES));
     let (first, last) = (first?, last?);
     match last {
         Some(last) if last < first => {

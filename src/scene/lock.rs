@@ -5,6 +5,7 @@
 use super::Scene;
 use super::objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
 use super::spec::*;
+use super::units::Units;
 
 /// A number with the fewest digits that give the same bits again.
 fn number(value: f64) -> String {
@@ -96,8 +97,9 @@ impl Scene {
         if let Some(fit) = fit {
             fit_lines(fit, &mut lines);
         }
-        for MarkerSpec { name, position_mm, sd_mm, place: _ } in markers {
+        for MarkerSpec { name, label, position_mm, sd_mm, place: _ } in markers {
             lines.extend(["\n[[marker]]".into(), format!("name = {}", text(name))]);
+            lines.push(format!("label = {}", text(label)));
             lines.push(format!("position_mm = {}", numbers(position_mm)));
             lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
         }
@@ -425,6 +427,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         objectives,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
+        registration: RegistrationSpec { register, neutral, axes, register_place: _, neutral_place: _ },
         tolerance,
         max_iterations,
         finite_difference_step,
@@ -444,7 +447,11 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
     let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
-    lines.extend(["\n[fit]".into(), format!("markers = {}", path(markers)), format!("units = \"{units}\"")]);
+    lines.extend([
+        "\n[fit]".into(),
+        format!("markers = {}", path(markers)),
+        format!("units = \"{}\"", units.map_or("estimate", Units::name)),
+    ]);
     lines.extend(topic.as_ref().map(|topic| format!("topic = {}", text(topic))));
     lines.extend([
         format!("sensitivity = \"{sensitivity}\""),
@@ -459,6 +466,9 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     lines.extend([
         format!("max_marker_distance_mm = {}", number(*max_marker_distance_mm)),
         format!("frames = {{ first = {first}, {last}step = {step} }}"),
+        format!("register = \"{}\"", register.word()),
+        neutral.map_or("neutral = \"first\"".into(), |frame| format!("neutral = {frame}")),
+        format!("axes = [{}]", axes.map(|axis| text(axis.word())).join(", ")),
         format!("tolerance = {}", number(*tolerance)),
         format!("max_iterations = {max_iterations}"),
         format!("finite_difference_step = {}", number(*finite_difference_step)),

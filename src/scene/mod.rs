@@ -20,6 +20,7 @@ mod nearest;
 mod objectives;
 mod overrides;
 mod references;
+mod registration;
 mod spec;
 mod study;
 mod tree;

@@ -755,8 +755,10 @@ pub struct ProbeSpec {
 /// A marker glued to the surface: `[[marker]]`.
 #[derive(Debug, Clone, Serialize)]
 pub struct MarkerSpec {
-    /// Its label in the recording, unique among markers.
+    /// Its name, unique among markers.
     pub name: String,
+    /// Its label in the recording; its name if the file does not say.
+    pub label: String,
     /// Where it is before anything moves, mm.
     pub position_mm: [f64; 3],
     /// The standard deviation of its measurement, mm, if it differs from that of the fit.
@@ -771,8 +773,8 @@ pub struct MarkerSpec {
 pub struct FitSpec {
     /// The recording.
     pub markers: PathBuf,
-    /// The unit of length in the recording.
-    pub units: Units,
+    /// The unit of length in the recording; `None` where it is to be estimated.
+    pub units: Option<Units>,
     /// The topic of the markers, where the recording has several.
     pub topic: Option<String>,
     /// How the derivative of marker positions by activations is found.
@@ -795,6 +797,8 @@ pub struct FitSpec {
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.
     pub frames: FramesSpec,
+    /// How the recording is brought to the model.
+    pub registration: RegistrationSpec,
     /// The change of the controls, as a part of their range, at which the search ends; the step that shows it is still taken.
     pub tolerance: f64,
     /// The most Gauss-Newton steps per frame.
@@ -814,6 +818,75 @@ pub struct FitSpec {
     /// Its choice of frames; the table where it has none.
     #[serde(skip)]
     pub frames_place: Place,
+}
+
+/// How a recording is brought to the model: `[fit] register`, `neutral` and `axes`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegistrationSpec {
+    /// By which motion.
+    pub register: RegisterSpec,
+    /// The frame in which nothing has moved yet; by default the first of those that show the most markers.
+    pub neutral: Option<usize>,
+    /// The axes of the recording that are x, y and z of the model, before that motion.
+    pub axes: [AxisSpec; 3],
+    /// The word of `register`; the table where there is none.
+    #[serde(skip)]
+    pub register_place: Place,
+    /// The choice of the neutral frame; the table where there is none.
+    #[serde(skip)]
+    pub neutral_place: Place,
+}
+
+/// The motion that brings a recording to the model: `[fit] register`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RegisterSpec {
+    /// It stands where the model does.
+    None,
+    /// A turn and a shift.
+    Rigid,
+    /// A turn, a shift and a scale.
+    Similarity,
+}
+
+impl RegisterSpec {
+    /// The word in the problem file.
+    pub fn word(self) -> &'static str {
+        match self {
+            RegisterSpec::None => "none",
+            RegisterSpec::Rigid => "rigid",
+            RegisterSpec::Similarity => "similarity",
+        }
+    }
+}
+
+/// An axis of a recording, or its opposite: `"x"`, `"-x"`, ...
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct AxisSpec(usize);
+
+impl AxisSpec {
+    /// x, y, z, -x, -y, -z.
+    pub const ALL: [AxisSpec; 6] = [AxisSpec(0), AxisSpec(1), AxisSpec(2), AxisSpec(3), AxisSpec(4), AxisSpec(5)];
+
+    /// Which coordinate it is, 0 to 2.
+    pub fn index(self) -> usize {
+        self.0 % 3
+    }
+
+    /// 1, or -1 for the opposite.
+    pub fn sign(self) -> f64 {
+        if self.0 < 3 { 1.0 } else { -1.0 }
+    }
+
+    /// The opposite.
+    pub fn reversed(self) -> AxisSpec {
+        AxisSpec((self.0 + 3) % 6)
+    }
+
+    /// The word in the problem file.
+    pub fn word(self) -> &'static str {
+        ["x", "y", "z", "-x", "-y", "-z"][self.0]
+    }
 }
 
 /// How the derivative of the shape by the activations is found: `[fit] sensitivity`.

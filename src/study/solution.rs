@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::fit::placement::Marker;
 use crate::fit::recording::{chosen_frames, read};
 use crate::fit::sequence::settings;
-use crate::fit::{Estimate, Fit, placement};
+use crate::fit::{Estimate, Fit, placement, registration};
 use crate::forward::drives::drives;
 use crate::forward::{Equilibrium, Solver, Work};
 use crate::markers::Recording;
@@ -73,8 +73,11 @@ impl Prepared {
         let build_seconds = start.elapsed().as_secs_f64();
         let clip = match (scene.task, &scene.fit) {
             (Task::Fit, Some(fit)) => {
-                let recording = read(fit)?;
+                let mut recording = read(fit)?;
                 let frames = chosen_frames(fit, &recording)?;
+                let mesh = built.model.mesh();
+                let markers = placement::place(&scene, fit, mesh, &recording)?;
+                registration::register(&scene, fit, mesh, &markers, &mut recording)?;
                 Some((recording, frames))
             }
             _ => None,

@@ -62,6 +62,7 @@ fn fit_summary_marks_bounds_and_the_worst_markers() {
     let frames = [fitted(3, [0.5, 0.0]), fitted(4, [0.75, 0.0]), fitted(5, [0.25, 0.0])];
     let mut summary = FitSummary {
         name: "smile",
+        recording: "registration: rigid\n",
         controls: &MUSCLES,
         bones: false,
         frames: &frames[..1],
@@ -78,7 +79,13 @@ fn fit_summary_marks_bounds_and_the_worst_markers() {
     };
     let one = summary.to_string();
     println!("{one}");
-    for part in ["0.5000  0.0123", "0.0000       -  at its lower bound", "rms 0.500 mm, max 0.500 mm", "brow, left"] {
+    for part in [
+        "0.5000  0.0123",
+        "0.0000       -  at its lower bound",
+        "rms 0.500 mm, max 0.500 mm",
+        "brow, left",
+        "\nregistration: rigid\n",
+    ] {
         assert!(one.contains(part), "{part} is not in\n{one}");
     }
     assert!(!one.contains("lost"));

@@ -27,6 +27,8 @@ pub struct FittedFrame {
 pub struct FitSummary<'a> {
     /// Name of the problem.
     pub name: &'a str,
+    /// How the recording was brought to the model: whole lines, or nothing.
+    pub recording: &'a str,
     /// Names of the controls, those of bones with their unit.
     pub controls: &'a [&'a str],
     /// Whether some of them are of bones.
@@ -76,6 +78,9 @@ impl fmt::Display for FitSummary<'_> {
         self.of_markers(out)?;
         write!(out, "{}", self.outliers)?;
         writeln!(out, "  minimised: {}", self.objective)?;
+        if !self.recording.is_empty() {
+            write!(out, "\n{}", self.recording)?;
+        }
         write!(out, "{}", self.mesh_errors)?;
         let kind = if self.bones { "control" } else { "muscle" };
         let told = ToldSummary { clip: self.told, controls: self.controls, markers: self.markers, kind };

@@ -16,6 +16,7 @@ mod markers;
 mod muscles;
 mod objectives;
 mod probes;
+mod registration;
 
 pub use activations::ActivationTable;
 pub use bones::BoneTable;
@@ -30,6 +31,7 @@ pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
 pub use objectives::{ObjectiveTable, OutlierTable};
 pub use probes::ProbeTable;
+pub use registration::{Placement, write_registration};
 
 use super::frame::Frame;
 use super::run_folder::failed;

@@ -1,0 +1,235 @@
+//! Where a recording stands, before any solve: one motion of its neutral frame to the markers of the model at rest.
+//!
+//! The motion is rigid, or a similarity where the recording has no true size, and most markers decide it: a few that are off
+//! do not turn it ([`crate::math::motion::robust`]). What keeps the two apart is named ([`diagnosis`]), and nothing is
+//! mended that was not asked for.
+
+mod diagnosis;
+mod mirror;
+mod scale;
+
+pub use mirror::{nearest, pairings};
+pub use scale::{Scale, scale};
+
+use super::placement::{Marker, units_against};
+use crate::error::{Cause, Error, Misregistration, Result, Warning};
+use crate::markers::Recording;
+use crate::math::motion::{Agreed, Allowed, Motion, Pair, rms, robust, spread};
+use crate::math::tensor::{norm, subtract};
+use crate::mesh::Mesh;
+use crate::scene::{AxisSpec, FitSpec, RegisterSpec, Scene};
+
+/// A marker that is farther off than this part of the markers' spread is off.
+pub(super) const OFF: f64 = 0.1;
+/// A root mean square distance beyond this part of the spread needs a reason.
+pub(super) const LARGE: f64 = 0.05;
+
+/// How a recording was brought to its model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Registration {
+    /// What was asked for.
+    pub register: RegisterSpec,
+    /// From the recording (in mm, or in its own unit where that is estimated) to the model.
+    pub motion: Motion,
+    /// How far the motion takes the centre of the markers, mm.
+    pub moved_mm: f64,
+    /// The neutral frame.
+    pub neutral: usize,
+    /// How much larger the recording would have to be to be of the model's size; `None` where the markers do not say.
+    pub scale: Option<Scale>,
+    /// The markers that the neutral frame shows.
+    pub markers: Vec<Registered>,
+    /// Root mean square distance of those that are not off, mm.
+    pub rms_mm: f64,
+}
+
+/// A marker of the neutral frame on the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Registered {
+    /// Its name.
+    pub name: String,
+    /// How far it is from its place on the model at rest, mm.
+    pub distance_mm: f64,
+    /// Whether that is more than the others allow: it did not count.
+    pub off: bool,
+}
+
+/// What the neutral frame shows of the markers that are fitted.
+struct Neutral<'a> {
+    scene: &'a Scene,
+    fit: &'a FitSpec,
+    markers: &'a [Marker],
+    /// Positions of all markers on the model at rest, mm.
+    model: Vec<[f64; 3]>,
+    recording: &'a Recording,
+    frame: usize,
+    /// Markers that it shows.
+    shown: Vec<usize>,
+    /// (recording, model) of each of them.
+    pairs: Vec<Pair>,
+    /// Root mean square distance of the model's markers from their centre, mm.
+    size: f64,
+}
+
+impl Neutral<'_> {
+    fn wrong(&self, cause: Cause, rms_mm: f64, place: crate::Place) -> Error {
+        Error::Misregistered(Box::new(Misregistration { cause, frame: self.frame, rms_mm, place }))
+    }
+
+    fn name(&self, shown: usize) -> String {
+        self.markers[self.shown[shown]].name.clone()
+    }
+
+    /// (recording, model) of the markers that a frame shows.
+    fn pairs_of(&self, frame: usize) -> Vec<Pair> {
+        let positions = &self.recording.frames[frame].positions_mm;
+        let pair = |(m, x): (&Marker, &[f64; 3])| positions[m.column].map(|z| (z, *x));
+        self.markers.iter().zip(&self.model).filter_map(pair).collect()
+    }
+}
+
+/// Brings a recording to the model as `[fit]` asks: its axes, then the motion that registers its neutral frame.
+///
+/// # Errors
+/// K001 and K007 to K012: what keeps the recording from lying on the model, with the edit that mends it.
+pub fn register(
+    scene: &Scene,
+    fit: &FitSpec,
+    mesh: &Mesh,
+    markers: &[Marker],
+    recording: &mut Recording,
+) -> Result<(Registration, Vec<Warning>)> {
+    turn_axes(recording, fit.registration.axes);
+    let (registration, warnings) = registration(scene, fit, mesh, markers, recording)?;
+    if registration.motion != Motion::REST {
+        for position in recording.frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()) {
+            *position = registration.motion.place(*position);
+        }
+    }
+    Ok((registration, warnings))
+}
+
+/// Takes the axes of a recording as they are called.
+fn turn_axes(recording: &mut Recording, axes: [AxisSpec; 3]) {
+    for position in recording.frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()) {
+        *position = axes.map(|axis| axis.sign() * position[axis.index()]);
+    }
+}
+
+fn registration(
+    scene: &Scene,
+    fit: &FitSpec,
+    mesh: &Mesh,
+    markers: &[Marker],
+    recording: &Recording,
+) -> Result<(Registration, Vec<Warning>)> {
+    let spec = &fit.registration;
+    let model: Vec<[f64; 3]> = markers.iter().map(|m| mesh.position(m.point)).collect();
+    let frame = neutral_frame(fit, markers, recording)?;
+    let positions = &recording.frames[frame].positions_mm;
+    let shown: Vec<usize> = (0..markers.len()).filter(|k| positions[markers[*k].column].is_some()).collect();
+    let pairs: Vec<Pair> =
+        shown.iter().filter_map(|k| positions[markers[*k].column].map(|z| (z, model[*k]))).collect();
+    let size = spread(&pairs.iter().map(|p| p.1).collect::<Vec<_>>());
+    let neutral = Neutral { scene, fit, markers, model, recording, frame, shown, pairs, size };
+    if let Some(units) = fit.units {
+        units_against(&neutral.pairs, units, fit)?;
+    }
+
+    let allowed = if spec.register == RegisterSpec::Similarity { Allowed::SIMILARITY } else { Allowed::RIGID };
+    let placed = match spec.register {
+        RegisterSpec::None => in_place(&neutral),
+        RegisterSpec::Rigid | RegisterSpec::Similarity => {
+            robust(&neutral.pairs, allowed, OFF * size).ok_or_else(|| {
+                let cause = Cause::TooFew { markers: neutral.pairs.len() };
+                neutral.wrong(cause, 0.0, spec.register_place.clone())
+            })?
+        }
+    };
+    let warning = diagnosis::diagnose(&neutral, &placed, allowed)?;
+    let agreeing: Vec<Pair> =
+        neutral.pairs.iter().zip(&placed.off).filter(|(_, off)| !**off).map(|(p, _)| *p).collect();
+    let markers = (0..neutral.pairs.len())
+        .map(|k| Registered { name: neutral.name(k), distance_mm: placed.distances[k], off: placed.off[k] })
+        .collect();
+    let registration = Registration {
+        register: spec.register,
+        motion: placed.motion,
+        moved_mm: moved(&placed.motion, &neutral.pairs),
+        neutral: frame,
+        scale: scale(&agreeing),
+        markers,
+        rms_mm: placed.rms,
+    };
+    Ok((registration, warning.into_iter().collect()))
+}
+
+/// The neutral frame as it stands.
+fn in_place(neutral: &Neutral<'_>) -> Agreed {
+    let distances = Motion::REST.distances(&neutral.pairs);
+    let off: Vec<bool> = distances.iter().map(|d| *d > OFF * neutral.size).collect();
+    let rest: Vec<f64> = distances.iter().zip(&off).filter(|(_, off)| !**off).map(|(d, _)| *d).collect();
+    Agreed { motion: Motion::REST, rms: rms(&rest), distances, off }
+}
+
+/// How far a motion takes the centre of the recording's markers, the scale aside, mm.
+fn moved(motion: &Motion, pairs: &[Pair]) -> f64 {
+    if pairs.is_empty() {
+        return 0.0;
+    }
+    let centre = crate::math::motion::centre(pairs.iter().map(|p| p.0));
+    norm(subtract(motion.place(centre), centre.map(|c| motion.scale * c)))
+}
+
+/// The frame that the problem calls neutral, or the first of those that show the most markers.
+///
+/// # Errors
+/// K004 where it does not exist.
+pub fn neutral_frame(fit: &FitSpec, markers: &[Marker], recording: &Recording) -> Result<usize> {
+    let count = recording.frames.len();
+    match fit.registration.neutral {
+        Some(frame) if frame >= count => {
+            let place = fit.registration.neutral_place.clone();
+            let cause = Cause::NoSuchFrame { count };
+            Err(Error::Misregistered(Box::new(Misregistration { cause, frame, rms_mm: 0.0, place })))
+        }
+        Some(frame) => Ok(frame),
+        None => {
+            let shown =
+                |k: &usize| markers.iter().filter(|m| recording.frames[*k].positions_mm[m.column].is_some()).count();
+            Ok((0..count).rev().max_by_key(shown).unwrap_or(0))
+        }
+    }
+}
+
+impl std::fmt::Display for Registration {
+    /// A paragraph of a page.
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Registration { register, motion, moved_mm, neutral, scale, markers, rms_mm } = self;
+        match register {
+            RegisterSpec::None => write!(out, "registration: none, the recording stands where it is")?,
+            RegisterSpec::Rigid | RegisterSpec::Similarity => {
+                let by = format!("turned by {:.2} degrees, moved by {moved_mm:.2} mm", motion.angle().to_degrees());
+                write!(out, "registration: {}, {by}", register.word())?;
+            }
+        }
+        if *register == RegisterSpec::Similarity {
+            write!(out, ", scaled by {:.5}", motion.scale)?;
+        }
+        let off: Vec<&str> = markers.iter().filter(|m| m.off).map(|m| m.name.as_str()).collect();
+        let counted = markers.len() - off.len();
+        writeln!(
+            out,
+            "\n  its frame {neutral} fits the model at rest with an rms of {rms_mm:.3} mm over {counted} markers"
+        )?;
+        if !off.is_empty() {
+            writeln!(out, "  {} did not count, being farther off: {}", off.len(), off.join(", "))?;
+        }
+        match scale {
+            Some(Scale { value, interval: [lower, upper] }) => {
+                writeln!(out, "  the scale that fits best is {value:.5} (95 %: {lower:.5} to {upper:.5})")
+            }
+            None => Ok(()),
+        }
+    }
+}

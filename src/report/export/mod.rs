@@ -1,0 +1,99 @@
+//! What others open. FAMILY: each format in a file of its own, all made from a [`Playback`].
+
+pub mod exf;
+pub mod glb;
+pub mod mcap;
+pub mod modes;
+pub mod obj;
+pub mod ply;
+pub mod sto;
+
+use super::playback::{Playback, Shape};
+use super::run_folder::{failed, write_atomically};
+use crate::error::{Error, Result, Warning};
+use std::path::{Path, PathBuf};
+
+/// A format to export to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Format {
+    /// Skin, muscles, deformation modes and activation curves for Blender and game engines.
+    Glb,
+    /// Everything over time for Foxglove, Lichtblick and Rerun.
+    Mcap,
+    /// Activations for OpenSim.
+    Sto,
+    /// The exact shape for Zinc and cmgui, a file per frame.
+    Exf,
+    /// Skin and muscles of one frame.
+    Obj,
+    /// The skin of one frame with its displacement.
+    Ply,
+}
+
+impl Format {
+    /// All of them, with their words and what they are for.
+    pub const ALL: [(Format, &'static str, &'static str); 6] = [
+        (Format::Glb, "glb", "Blender and game engines: skin, muscles, deformation modes, activation curves"),
+        (Format::Mcap, "mcap", "Foxglove, Lichtblick, Rerun: everything over time, with a layout"),
+        (Format::Sto, "sto", "OpenSim: activations"),
+        (Format::Exf, "exf", "Zinc and cmgui: the exact shape, a file per frame"),
+        (Format::Obj, "obj", "anything that reads meshes: skin and muscles of one frame"),
+        (Format::Ply, "ply", "the skin of one frame with its displacement"),
+    ];
+}
+
+/// What was written, and what is to be known about it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Exported {
+    /// The files.
+    pub files: Vec<PathBuf>,
+    /// What their reader must know.
+    pub warnings: Vec<Warning>,
+}
+
+impl Exported {
+    fn write(&mut self, path: PathBuf, contents: impl AsRef<[u8]>) -> Result<()> {
+        write_atomically(&path, contents.as_ref())?;
+        self.files.push(path);
+        Ok(())
+    }
+}
+
+/// Writes a run into `folder` in some formats; files of the same name are replaced. `frame` chooses the one that formats of a
+/// single frame show: by default that which moved most.
+///
+/// # Errors
+/// [`Error::NoShapes`], [`Error::NoSuchShape`], [`Error::Io`].
+pub fn export(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path) -> Result<Exported> {
+    std::fs::create_dir_all(folder).map_err(failed("create", folder))?;
+    let mut done = Exported::default();
+    for format in formats {
+        match format {
+            Format::Glb => done.write(folder.join("result.glb"), glb::file(run)?)?,
+            Format::Mcap => mcap::write(run, folder, &mut done)?,
+            Format::Sto => done.write(folder.join("activations.sto"), sto::text(run))?,
+            Format::Exf => exf::copy(run, folder, &mut done)?,
+            Format::Obj => {
+                let shape = chosen(run, frame)?;
+                done.write(folder.join(format!("frame_{:04}.obj", shape.frame.index)), obj::text(run, shape))?;
+            }
+            Format::Ply => {
+                let shape = chosen(run, frame)?;
+                done.write(folder.join(format!("frame_{:04}.ply", shape.frame.index)), ply::file(run, shape))?;
+            }
+        }
+    }
+    Ok(done)
+}
+
+/// The shape of a frame, or that which moved most.
+fn chosen(run: &Playback, frame: Option<usize>) -> Result<&Shape> {
+    let shapes = run.shown()?;
+    match frame {
+        None => Ok(run.farthest().unwrap_or(&shapes[0])),
+        Some(frame) => shapes.iter().find(|shape| shape.frame.index == frame).ok_or_else(|| {
+            let kept: Vec<String> = shapes.iter().map(|shape| shape.frame.index.to_string()).collect();
+            Error::NoSuchShape { path: run.folder.clone(), frame, kept: kept.join(", ").into() }
+        }),
+    }
+}
