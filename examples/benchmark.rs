@@ -66,7 +66,8 @@ fn fitted_frames() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::read(&path, &[])?;
     let spec = scene.fit.as_ref().ok_or("problems/beam is a fit")?;
     let model = build(&scene)?.model;
-    let recording = read(&spec.markers, &ReadOptions { units: spec.units, ..ReadOptions::default() })?;
+    let recording =
+        read(&spec.markers, &ReadOptions { units: spec.units.unwrap_or_default(), ..ReadOptions::default() })?;
     let mut fit = Fit::new(&model, &scene, spec, &recording)?;
     let mut seconds = Vec::new();
     let mut factorisations = Vec::new();

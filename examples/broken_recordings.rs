@@ -4,7 +4,6 @@
 //! (`mocap4r2_msgs/msg/Markers`, CDR), and each thing that can be wrong with such a file.
 
 #[path = "../tests/recordings/writer.rs"]
-#[allow(dead_code)] // shared with the tests of recordings, which need all of it
 mod writer;
 
 use std::path::Path;
@@ -30,7 +29,7 @@ fn main() -> std::io::Result<()> {
     flipped[good.len() / 3] ^= 0b0001_0000;
     let lost = |position: fn([f64; 3]) -> [f64; 3]| whole(&[markers(|_, p| position(p))]);
     let no_checksums = container("none").calculate_chunk_crcs(false).calculate_data_section_crc(false);
-    let text = ("std_msgs/msg/String", "ros2msg", "string data\n".to_owned());
+    let text = ("std_msgs/msg/String", "ros2msg", b"string data\n".to_vec());
     let hello = Message { log_time: START_NS, publish_time: START_NS, payload: b"\0\x01\0\0\x03\0\0\0hi\0".to_vec() };
     let chatter =
         Topic { name: "/chatter", schema: text, encoding: "cdr", unit: None, messages: vec![hello.clone()] };

@@ -296,7 +296,7 @@ fn the_topic_is_found_or_named() {
     assert_eq!(error.help().unwrap(), "this one can be read: topic = \"/markers\"");
     let error = asked(&[protobuf()], Some("/cloud")).unwrap_err();
     assert!(matches!(&error, Error::TopicNotReadable { reason: Unreadable::Encoding, .. }), "{error}");
-    let bare = Topic { schema: ("", "", String::new()), ..image() };
+    let bare = Topic { schema: ("", "", Vec::new()), ..image() };
     let error = asked(&[bare], Some("/camera")).unwrap_err();
     assert!(matches!(&error, Error::TopicNotReadable { reason: Unreadable::NoSchema, .. }), "{error}");
     let error = asked(&[Topic::json("{,", vec![])], Some("/markers")).unwrap_err();
@@ -383,7 +383,7 @@ fn bad_messages_are_errors_with_their_place() {
     let read = |markers: &[Ros2Marker]| {
         let payload = ros2_message(false, false, stamp(0), markers);
         let topic = Topic::ros2(false, vec![message(stamp(0), payload)]);
-        let topic = Topic { schema: ("mocap4r2_msgs/msg/Markers", "ros2msg", bounded.clone()), ..topic };
+        let topic = Topic { schema: ("mocap4r2_msgs/msg/Markers", "ros2msg", bounded.clone().into_bytes()), ..topic };
         load(&file(container("none"), &[topic]), &ReadOptions::default())
     };
     assert_eq!(read(&two[..1]).unwrap().labels, ["a"]);
@@ -611,7 +611,7 @@ fn random_schemas_and_messages_do_not_panic() {
             payload.truncate(random.below(payload.len()));
         }
         let mut topic = Topic::ros2(true, vec![message(stamp(0), payload)]);
-        topic.schema.2 = schema;
+        topic.schema.2 = schema.into_bytes();
         let bytes = file(container("none"), &[topic]);
         match load(&bytes, &ReadOptions::default()) {
             Ok(recording) => {

@@ -101,7 +101,7 @@ fn registered(
         }
     }
     let placed = place(&scene, spec, &mesh, &recording)?;
-    let (registration, warnings) = register(&scene, spec, &mesh, &placed, &mut recording)?;
+    let (registration, warnings) = register(&scene, spec, &mesh, &placed, &mut recording, None)?;
     Ok((registration, warnings, recording))
 }
 
@@ -166,7 +166,8 @@ fn a_correct_recording_lies_on_its_model() {
     let markers = markers(1.5);
     let shown = noisy(&markers, 1);
     for fit in [NONE, RIGID, SIMILARITY] {
-        let (registration, warnings, found) = registered(&markers, recording(&[shown.clone()]), fit).unwrap();
+        let (registration, warnings, found) =
+            registered(&markers, recording(std::slice::from_ref(&shown)), fit).unwrap();
         assert!(warnings.is_empty(), "{fit}: {warnings:?}");
         assert!(registration.rms_mm < 0.7 && registration.markers.iter().all(|m| !m.off), "{registration}");
         assert!(registration.motion.angle() < 0.01 && registration.moved_mm < 0.2, "{registration}");
@@ -221,7 +222,7 @@ fn symmetric_markers_leave_open_which_of_the_two_it_is() {
 fn exchanged_labels_are_named() {
     let shown = noisy(&markers(1.5), 5);
     let two = exchanged(&shown, "eye.L", "chin.R");
-    told(&[two.clone()], &[NONE, RIGID, SIMILARITY], "K009", &["`eye.L` is where `chin.R` should be"]);
+    told(std::slice::from_ref(&two), &[NONE, RIGID, SIMILARITY], "K009", &["`eye.L` is where `chin.R` should be"]);
     told(&[moved(&two, &elsewhere())], &[RIGID], "K009", &["`chin.R` is where `eye.L` should be"]);
     // three in a circle, beside a pair
     let three = exchanged(&exchanged(&two, "nose.L", "jaw.R"), "jaw.R", "temple.L");
@@ -255,8 +256,13 @@ fn a_frame_that_is_not_neutral_is_told_with_one_that_is() {
 fn a_recording_that_stands_elsewhere_is_brought_home_only_when_asked() {
     let rest = markers(1.5);
     let shown = moved(&noisy(&rest, 10), &elsewhere());
-    told(&[shown.clone()], &[NONE], "K011", &["turned by 34.", "register = \"rigid\"", "nothing was moved"]);
-    let (registration, warnings, found) = registered(&rest, recording(&[shown.clone()]), RIGID).unwrap();
+    told(
+        std::slice::from_ref(&shown),
+        &[NONE],
+        "K011",
+        &["turned by 34.", "register = \"rigid\"", "nothing was moved"],
+    );
+    let (registration, warnings, found) = registered(&rest, recording(std::slice::from_ref(&shown)), RIGID).unwrap();
     assert!(warnings.is_empty() && (registration.motion.angle() - 0.6).abs() < 0.01, "{registration}");
     for ((_, truth), position) in rest.iter().zip(&found.frames[0].positions_mm) {
         assert!(norm(subtract(*truth, position.unwrap())) < 1.2);

@@ -223,6 +223,16 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     expect("name = \"tip\"", "name = \"\"", "C005", "\"\"", "a name");
     expect("units = \"m\"", "units = \"estimate\"", "C005", "\"estimate\"", "register is not \"similarity\"");
     expect("\"-x\", \"z\"", "\"-y\", \"z\"", "C005", "[\"-y\"", "each of x, y, z once");
+    let bones = "neutral = 3\nhead = { bone_markers = [\"a\", \"b\", \"a\"] }";
+    expect("neutral = 3", bones, "C007", "[\"a\", \"b\"", "at least 3, which do not lie on a line");
+    expect(
+        "neutral = 3",
+        "neutral = 3\nhead = { estimate = false }",
+        "C005",
+        "false",
+        "without the table the head does not move",
+    );
+    expect("neutral = 3", "neutral = 3\nhead = {}", "C011", "{}", "add the one you mean");
     expect("neutral = 3", "neutral = -3", "C005", "-3", "a whole number from 0");
     expect("neutral = 3", "neutral = \"last\"", "C006", "\"last\"", "it can be \"first\"");
     // C006 unknown choice
@@ -406,6 +416,14 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
     assert_eq!(lock, again.lock());
     for default in ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""] {
         assert!(lock.contains(default), "{default} is not in\n{lock}");
+    }
+    for head in ["{ bone_markers = [\"brow.L\", \"b\", \"c\"] }", "{ pose_topic = \"/head\" }", "{ estimate = true }"]
+    {
+        let scene = parse(WHOLE, &[&format!("fit.head={head}")]).unwrap();
+        let lock = scene.lock();
+        let again = Scene::parse(&lock, "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();
+        assert_eq!((content(&scene), &lock), (content(&again), &again.lock()));
+        assert!(lock.contains("[fit.head]"), "{lock}");
     }
 }
 

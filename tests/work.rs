@@ -48,7 +48,7 @@ fn default_fit() {
     let scene = Scene::read(&root.join("problems/beam/problem.toml"), &[]).expect("a scene");
     let spec = scene.fit.as_ref().expect("a fit");
     let model = build(&scene).expect("a model").model;
-    let options = ReadOptions { units: spec.units, ..ReadOptions::default() };
+    let options = ReadOptions { units: spec.units.unwrap_or_default(), ..ReadOptions::default() };
     let recording = read(&spec.markers, &options).expect("the recording");
     let mut fit = Fit::new(&model, &scene, spec, &recording).expect("a fit");
     let mut factorisations = Vec::new();

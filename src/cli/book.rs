@@ -9,6 +9,7 @@ use super::telling::Telling;
 use super::terminal::print;
 use crate::error::{Result, Warning};
 use crate::fit::advise::MarkerHelp;
+use crate::fit::free_head::{FreeHead, page};
 use crate::fit::registration::Registration;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
@@ -28,6 +29,8 @@ pub(super) struct Book<'a> {
     telling: Telling,
     pub estimates: Estimates<'a>,
     pub tally: Tally,
+    /// The head in every frame where it was estimated.
+    pub heads: Vec<(usize, FreeHead)>,
     fitted: Vec<FittedFrame>,
     errors: MarkerErrors,
     outliers: Outliers,
@@ -59,6 +62,7 @@ impl<'a> Book<'a> {
             record,
             estimates,
             tally: Tally::default(),
+            heads: Vec::new(),
             fitted: Vec::new(),
             errors: MarkerErrors::default(),
             outliers: Outliers::default(),
@@ -108,6 +112,7 @@ impl<'a> Book<'a> {
         };
         let biases: Vec<_> = error.iter().flat_map(|e| e.biases.iter().map(|(_, bias)| *bias)).collect();
         let help = self.telling.frame(frame, &estimate, fit, (live, known_help), &biases, &mut self.record)?;
+        self.heads.extend(estimate.head.clone().map(|head| (estimate.frame, head)));
         self.fitted.push(FittedFrame {
             frame,
             values: estimate.equilibrium.state.controls.clone(),
@@ -132,9 +137,10 @@ impl<'a> Book<'a> {
         self.record.told_of_clip(&self.telling.clip, &self.labels)?;
         self.record.finish(work, self.estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
         let controls: Vec<&str> = self.labels.iter().map(String::as_str).collect();
+        let sought: Vec<&str> = fit.unknowns().iter().map(|k| self.labels[*k].as_str()).collect();
         let summary = FitSummary {
             name: &scene.name,
-            recording: &registration.to_string(),
+            recording: &(page(&self.heads, registration.centre, &sought) + &registration.to_string()),
             controls: &controls,
             bones: !self.model.bones().is_empty(),
             frames: &self.fitted,
@@ -149,9 +155,9 @@ impl<'a> Book<'a> {
             seconds: run.start.elapsed().as_secs_f64(),
             folder: &run.folder.path().display().to_string(),
         };
-        let page = summary.to_string();
-        run.folder.write("summary.txt", &page)?;
-        print(&page)?;
+        let text = summary.to_string();
+        run.folder.write("summary.txt", &text)?;
+        print(&text)?;
         Ok(self.tally)
     }
 }

@@ -9,14 +9,18 @@ use super::progress::Meter;
 use super::run::{Run, Tally};
 use crate::cli::diagnostics::render_error;
 use crate::error::{Result, Warning};
+use crate::fit::free_head::FreeHead;
+use crate::fit::head::{HeadFrame, HeadMotion};
 use crate::fit::placement::Marker;
 use crate::fit::registration::Registration;
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::markers::Recording;
+use crate::math::motion::Motion;
+use crate::math::tensor::subtract;
 use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
-use crate::report::tables::{Placement, write_registration};
+use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
 
@@ -34,6 +38,9 @@ pub(super) fn fit(
     let probes = probes(scene, built);
     let mut fit = Fit::new(&built.model, scene, spec, recording)?;
     write_registration(&run.folder, &placements(fit.markers(), registration))?;
+    if let Some(head) = &registration.head {
+        write_head(&run.folder, &heads(head, registration, recording))?;
+    }
     let record = Record::create(&run.folder, &built.model, &probes, &scene.output, true)?;
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
     let estimates = Estimates::new(prepared, settings(scene), placed)?;
@@ -107,6 +114,10 @@ pub(super) fn fit(
         smooth(&mut fit, recording, (frames, &passed), &mut book, run, (&mut meter, flags))?;
     }
     *work = fit.work();
+    let sought: Vec<&str> = fit.unknowns().iter().map(|k| book.labels[*k].as_str()).collect();
+    if !book.heads.is_empty() {
+        write_free_head(&run.folder, &sought, &free_heads(&book.heads, registration, recording))?;
+    }
     book.finish(scene, (&fit, registration), work, run, (&mut meter, flags))
 }
 
@@ -167,4 +178,31 @@ fn placements<'m>(markers: &'m [Marker], registration: &Registration) -> Vec<Pla
         counted: shown(m).is_some_and(|registered| !registered.off),
     };
     markers.iter().map(placement).collect()
+}
+
+/// The head in every frame where it was estimated.
+fn free_heads(heads: &[(usize, FreeHead)], registration: &Registration, recording: &Recording) -> Vec<FreeHeadRow> {
+    let of = registration.centre;
+    let row = |(index, head): &(usize, FreeHead)| FreeHeadRow {
+        frame: Frame { index: *index, time_s: recording.frames[*index].time_s },
+        motion: [head.motion.rotation_vector().map(f64::to_degrees), subtract(head.motion.place(of), of)],
+        sd: head.sd,
+        confounding: head.correlation.iter().zip(&head.inflation).map(|(c, i)| [*c, *i]).collect(),
+    };
+    heads.iter().map(row).collect()
+}
+
+/// The head in every frame of the recording.
+fn heads(head: &HeadMotion, registration: &Registration, recording: &Recording) -> Vec<HeadRow> {
+    let of = registration.centre;
+    let sizes = |motion: Motion| {
+        [motion.rotation_vector().map(f64::to_degrees), std::array::from_fn(|i| motion.place(of)[i] - of[i])]
+    };
+    let row = |(index, frame): (usize, &HeadFrame)| HeadRow {
+        frame: Frame { index, time_s: recording.frames[index].time_s },
+        motion: frame.motion.map(sizes),
+        rms_mm: frame.rms_mm,
+        markers: frame.markers,
+    };
+    head.frames.iter().enumerate().map(row).collect()
 }

@@ -15,6 +15,7 @@ mod fibres;
 mod fit;
 mod forward;
 mod inspect;
+mod markers;
 mod new;
 mod noticed;
 mod prepare;
@@ -36,6 +37,7 @@ use crate::error::explain::Page;
 use crate::error::{Error, Result, Warning};
 use crate::fit::advise::Criterion;
 use crate::report::export::Format;
+use crate::scene::Units;
 
 /// Finds out which muscles moved a face.
 ///
@@ -93,11 +95,16 @@ enum Command {
     },
     /// What is in a marker recording, or in the folder of a run
     Inspect {
-        /// An MCAP file, or a folder
+        /// An MCAP, C3D, TRC or CSV file, or a folder
         file: PathBuf,
         /// As JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Convert a marker recording, or propose which label is which marker
+    Markers {
+        #[command(subcommand)]
+        command: Markers,
     },
     /// Write a finished run for other programs; nothing is solved again
     Export {
@@ -120,6 +127,28 @@ enum Command {
     Completions {
         /// The shell
         shell: clap_complete::Shell,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+enum Markers {
+    /// Write the markers of an MCAP, C3D, TRC or CSV file as MCAP, in millimetres
+    Convert {
+        /// What to read
+        input: PathBuf,
+        /// What to write; --force replaces it
+        output: PathBuf,
+        /// The unit of the positions in it [default: what the file says]
+        #[arg(long, value_parser = unit)]
+        units: Option<Units>,
+        /// The topic, where an MCAP file has several
+        #[arg(long)]
+        topic: Option<String>,
+    },
+    /// Print the [[marker]] tables of a problem with the labels that fit best, by geometry
+    Match {
+        /// problem.toml
+        problem: PathBuf,
     },
 }
 
@@ -232,6 +261,11 @@ fn millimetres(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
+/// `mm`, `cm` or `m`.
+fn unit(text: &str) -> std::result::Result<Units, String> {
+    Units::from_name(text).ok_or_else(|| "it can be mm, cm or m".into())
+}
+
 /// How a command that did not fail ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Ending {
@@ -310,6 +344,10 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
             advise::run(&advise::Question { path: problem, markers, criterion, apart_mm, json }, &cli.flags)
         }
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
+        Some(Command::Markers { command: Markers::Convert { input, output, units, topic } }) => {
+            markers::convert(input, output, *units, topic.as_deref(), &cli.flags)
+        }
+        Some(Command::Markers { command: Markers::Match { problem } }) => markers::match_labels(problem, &cli.flags),
         Some(Command::Export { run, to, frame }) => export::export(run, to, *frame, &cli.flags),
         Some(Command::Explain { code }) => explain::explain(code),
         Some(Command::Completions { shell }) => completions::completions(*shell),

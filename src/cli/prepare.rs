@@ -64,7 +64,8 @@ fn clip(source: &Source, scene: &Scene, fit: &FitSpec) -> Result<Clip> {
     let frames = chosen_frames(fit, &recording);
     let placed = match host(&scene.mesh) {
         Ok(mesh) => place(scene, fit, &mesh, &recording).and_then(|markers| {
-            let (registration, odd) = register(scene, fit, &mesh, &markers, &mut recording)?;
+            let poses = source.poses(fit, &recording)?;
+            let (registration, odd) = register(scene, fit, &mesh, &markers, &mut recording, poses.as_ref())?;
             warnings.extend(odd);
             Ok((markers, registration))
         }),

@@ -4,7 +4,7 @@ use super::Flags;
 use super::terminal::tell;
 use crate::error::{Error, Result, Warning};
 use crate::fit::recording;
-use crate::markers::{self, Recording, read_bytes};
+use crate::markers::{self, Poses, Recording, read_bytes};
 use crate::report::study::read_choices;
 use crate::scene::{FitSpec, Scene, Units};
 use std::path::Path;
@@ -47,6 +47,11 @@ impl Source {
         }
         read_bytes(Path::new(RECORDING_NAME), RECORDING, &recording::options(fit))
             .map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
+    }
+
+    /// The poses of the head, where the fit takes them from a topic of its recording.
+    pub fn poses(&self, fit: &FitSpec, recording: &Recording) -> Result<Option<Poses>> {
+        recording::poses(fit, recording, self.embedded_recording(fit))
     }
 
     /// The recording as bytes, if it is the built-in one: a run keeps a copy, so that its lock file can be run again.

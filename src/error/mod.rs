@@ -342,6 +342,28 @@ pub enum Error {
         /// First two bytes of its payload.
         id: [u8; 2],
     },
+    /// A marker file is not what its format asks for.
+    #[error("{} cannot be read: {at}: {message}", path.display())]
+    MarkerFile {
+        /// The file.
+        path: PathBuf,
+        /// Where: `line 7`, `byte 512`.
+        at: Box<str>,
+        /// What is wrong there.
+        message: Box<str>,
+    },
+    /// Neither the file nor the user says in which unit its positions are.
+    #[error(
+        "{} does not say in which unit its positions are{}",
+        path.display(),
+        if declared.is_empty() { String::new() } else { format!(" (it says: {declared})") }
+    )]
+    NoUnits {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        declared: Box<str>,
+    },
     /// A frame that is to be written has not one position per label.
     #[error("frame {frame} has {positions} positions for {labels} labels")]
     FrameShape {
@@ -405,6 +427,12 @@ pub enum Error {
         /// The foot on the surface, mm.
         foot: [f64; 3],
         /// The marker in the problem file.
+        place: Box<Place>,
+    },
+    /// There are no markers to match, or fewer than three in the recording.
+    #[error("there is nothing to match: a [fit] with three [[marker]] and a recording that shows three are needed")]
+    NothingToMatch {
+        /// The problem file, or the recording in it.
         place: Box<Place>,
     },
     /// The recording does not lie on the model.
@@ -752,6 +780,18 @@ pub enum Error {
         /// The problem.
         path: PathBuf,
     },
+    /// A frame shows too few markers to say where the head is.
+    #[error(
+        "frame {frame} at {time_s:.3} s shows {markers} markers: where the head is takes three that do not lie on a line"
+    )]
+    HeadNotSeen {
+        /// Frame of the recording.
+        frame: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// Markers that it shows.
+        markers: usize,
+    },
     /// The optimiser stopped for a reason of its own.
     #[error("the optimiser stopped: {message}")]
     Optimiser {
@@ -768,6 +808,12 @@ pub enum Error {
         path: PathBuf,
         /// What the operating system said.
         source: std::io::Error,
+    },
+    /// The file asked for exists already.
+    #[error("{} exists already", path.display())]
+    FileExists {
+        /// The file.
+        path: PathBuf,
     },
     /// The folder asked for holds something already.
     #[error("the output folder {} is not empty: it holds {entries} files or folders", path.display())]
@@ -865,6 +911,7 @@ impl Error {
             Error::Undecodable { .. } => "M011",
             Error::UnsupportedEncapsulation { .. } => "M012",
             Error::FrameShape { .. } => "M013",
+            Error::MarkerFile { .. } => "M015",
             Error::UnitsLookWrong { .. } => "K001",
             Error::UnknownLabel { .. } => "K002",
             Error::MarkerFarFromSurface { .. } => "K003",
@@ -906,8 +953,12 @@ impl Error {
             Error::NothingToResume { .. } => "C025",
             Error::ProblemChanged { .. } => "C026",
             Error::BadCheckpoint { .. } => "C027",
+            Error::HeadNotSeen { .. } => "F020",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
+            Error::FileExists { .. } => "O008",
+            Error::NoUnits { .. } => "M016",
+            Error::NothingToMatch { .. } => "K017",
             Error::NotARun { .. } => "O003",
             Error::NoShapes { .. } => "O004",
             Error::DamagedRun { .. } => "O005",
@@ -955,6 +1006,7 @@ impl Error {
             | Error::UnitsLookWrong { place, .. }
             | Error::UnknownLabel { place, .. }
             | Error::MarkerFarFromSurface { place, .. }
+            | Error::NothingToMatch { place }
             | Error::NoAxes { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),

@@ -187,6 +187,12 @@ pub enum Unreadable {
     /// The schema cannot be read.
     #[error("{0}")]
     Schema(#[from] SchemaFault),
+    /// The descriptors of protobuf messages cannot be used.
+    #[error("its protobuf descriptors cannot be used: {message}")]
+    Descriptors {
+        /// What is wrong.
+        message: String,
+    },
     /// The schema is not JSON.
     #[error("its schema is not JSON (line {line}, column {column})")]
     NotJson {
@@ -281,6 +287,26 @@ pub enum Fault {
     /// A field is not of the expected kind.
     #[error("the fields are not those of the schema")]
     Shape,
+    /// An orientation that is none.
+    #[error("an orientation has the length {length}, not 1")]
+    Quaternion {
+        /// Length of the quaternion.
+        length: f64,
+    },
+    /// Parts of a message stand in different coordinate frames.
+    #[error("its parts stand in different coordinate frames, `{a}` and `{b}`")]
+    Frames {
+        /// One of them.
+        a: String,
+        /// Another.
+        b: String,
+    },
+    /// The message is not protobuf.
+    #[error("{message}")]
+    Protobuf {
+        /// What the reader said.
+        message: String,
+    },
     /// The message is not the JSON that its schema promises.
     #[error("{message}")]
     Json {

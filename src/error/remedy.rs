@@ -22,7 +22,10 @@ impl Error {
             Error::MissingFile { .. } => Some("a relative path starts at the folder of the problem file".into()),
             Error::TimeOrder { .. } => Some("sort the rows by time, and keep one row per time".into()),
             Error::NotMcap { .. } => {
-                Some("give an MCAP file, as `ros2 bag record -s mcap` or Foxglove write it".into())
+                Some(
+                    "give an MCAP file, as `ros2 bag record -s mcap` or Foxglove write it, or a file that ends in .c3d, .trc or .csv"
+                        .into(),
+                )
             }
             Error::DamagedRecording { .. } => Some(
                 "copy the file again from where it was recorded, or save its good chunks with `mcap recover`".into(),
@@ -34,7 +37,9 @@ impl Error {
                 "rewrite it with checksums (`mcap recover IN -o OUT`), or add allow_unchecked = true to [fit]".into(),
             ),
             Error::NoMarkerTopic { .. } => Some(
-                "record `mocap4r2_msgs/msg/Markers` (CDR), or JSON with a JSON schema that has `markers[]`".into(),
+                "record `mocap4r2_msgs/msg/Markers`, a MarkerArray, a PoseArray, a foxglove PointCloud or SceneUpdate, or JSON whose schema has \
+                 `markers[]`"
+                    .into(),
             ),
             Error::SeveralMarkerTopics { topics, .. } => topics
                 .iter()
@@ -58,6 +63,16 @@ impl Error {
             Error::UnsupportedEncapsulation { .. } => {
                 Some("record with a ROS 2 middleware that writes plain CDR, as rosbag2 does by default".into())
             }
+            Error::NoUnits { .. } => Some("add --units mm, cm or m".into()),
+            Error::NothingToMatch { .. } => {
+                Some("give each marker of the model a [[marker]] with any name, and its position_mm".into())
+            }
+            Error::FileExists { .. } => Some("choose another name, or add --force to replace it".into()),
+            Error::MarkerFile { .. } => Some(
+                "write the file again from the program that made it; of one that is cut short, allow_truncated = true in [fit] \
+                 takes the intact part"
+                    .into(),
+            ),
             Error::FrameShape { .. } => Some("give every frame one position, or `None`, per label".into()),
             Error::UnitsLookWrong { likely: Some(likely), .. } => Some(format!("the data fit units = \"{likely}\"")),
             Error::UnitsLookWrong { likely: None, .. } => Some(
@@ -126,7 +141,7 @@ impl Error {
                 "raise fit.max_iterations, or look at the residuals: do the labels and positions belong together?"
                     .into(),
             ),
-            Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
+            Error::HeadNotSeen { .. } | Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
             Error::Axes { .. } => Some(
                 "a table x,y,z,vx,vy,vz as CSV, a field of vectors or tensors in a VTK, VTU or VTP file, lines in one, or a \
                  field of vectors at the nodes of an EX file is read; write field = \"..\" to choose one of several"

@@ -2,6 +2,7 @@
 
 use super::covariance::Bound;
 use super::frame::Directions;
+use super::free_head::FreeHead;
 use super::objective::Past;
 use crate::forward::Equilibrium;
 use crate::model::State;
@@ -77,6 +78,8 @@ pub struct Estimate {
     pub variance: Option<f64>,
     /// Whether its markers were not used: it had failed, and smoothness bridges it.
     pub bridged: bool,
+    /// The motion of the head, where it is estimated; measured positions then have it taken out.
+    pub head: Option<FreeHead>,
 }
 
 /// Where the iteration of a frame ended.
@@ -85,6 +88,8 @@ pub(super) struct Optimum {
     pub(super) directions: Option<Directions>,
     /// d(weighted residual)/d(unknown control).
     pub(super) jacobian: DMatrix<f64>,
+    /// The same with the head held, where that is free.
+    pub(super) held_head: Option<DMatrix<f64>>,
     pub(super) residuals: Vec<f64>,
     /// 1/2 sum of squared weighted residuals.
     pub(super) cost: f64,

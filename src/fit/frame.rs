@@ -1,11 +1,13 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
+use super::free_head;
 use super::gauss_newton::LeastSquares;
 use super::objective::{Instant, Objectives, Past, Sum};
 use super::placement::Marker;
 use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Solver};
+use crate::math::motion::Motion;
 use crate::mesh::MaterialPoint;
 use argmin::core::{Jacobian, Operator};
 use nalgebra::DMatrix;
@@ -32,6 +34,8 @@ pub struct FrameProblem<'f, 'm> {
     reuse: Reuse,
     drive: Drive,
     aims: Aims<'f>,
+    /// Whether the head moves as it fits best.
+    free_head: bool,
     inner: RefCell<Inner<'f, 'm>>,
 }
 
@@ -101,6 +105,8 @@ struct Inner<'f, 'm> {
     directions: Option<Directions>,
     /// The equilibrium last found, if it is another one.
     trial: Option<Equilibrium>,
+    /// d(weighted residual)/dq at `base` with the head held, where that is free.
+    held_head: Option<DMatrix<f64>>,
 }
 
 /// dx/dq for the unknowns, one direction each.
@@ -143,8 +149,24 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
-        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None });
-        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, inner }
+        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None, held_head: None });
+        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, free_head: false, inner }
+    }
+
+    /// With a head that moves as it fits best.
+    pub fn with_free_head(self, free_head: bool) -> Self {
+        FrameProblem { free_head, ..self }
+    }
+
+    /// The derivative that was last asked for with the head held, where the head is free.
+    pub fn take_held_head(&self) -> Option<DMatrix<f64>> {
+        self.inner.borrow_mut().held_head.take()
+    }
+
+    /// The motion that takes the measured markers nearest to those of the model, where the head is free.
+    fn back(&self, model: &[[f64; 3]]) -> Motion {
+        let nearest = if self.free_head { free_head::nearest(model, &self.measured) } else { None };
+        nearest.unwrap_or(Motion::REST)
     }
 
     /// The equilibrium at which the derivative was last asked for, the last one that the iteration accepted, and the
@@ -176,11 +198,14 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
     fn residuals(&self, inner: &Inner<'_, '_>, at: &Equilibrium) -> Vec<f64> {
         let model = inner.solver.model();
         let x = model.current(&at.state);
-        let residual = |m: &Measured| {
-            let position = model.mesh().interpolate(self.markers[m.marker].point, &x);
-            std::array::from_fn::<f64, 3, _>(|i| m.weight * (position[i] - m.position[i]))
+        let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
+        let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
+        let back = self.back(&positions);
+        let residual = |(m, position): (&Measured, &[f64; 3])| {
+            let measured = back.place(m.position);
+            std::array::from_fn::<f64, 3, _>(|i| m.weight * (position[i] - measured[i]))
         };
-        self.measured.iter().flat_map(residual).collect()
+        self.measured.iter().zip(&positions).flat_map(residual).collect()
     }
 
     fn residuals_at(&self, q: &[f64]) -> Result<Vec<f64>> {
@@ -259,6 +284,13 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             j.rows_mut(3 * row, 3).copy_from(&(rate * m.weight));
         }
         inner.directions = Some(directions);
+        if self.free_head {
+            let x = model.current(&inner.base.state);
+            let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
+            let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
+            let reduced = free_head::project(&j, &self.back(&positions), &self.measured);
+            inner.held_head = Some(std::mem::replace(&mut j, reduced));
+        }
         Ok(j)
     }
 }

@@ -54,7 +54,8 @@ pub fn place(scene: &Scene, fit: &FitSpec, mesh: &Mesh, recording: &Recording) -
     if mistakes.is_empty() { Ok(markers) } else { Err(Error::all(mistakes)) }
 }
 
-fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
+/// The error of a label that the recording does not have.
+pub(super) fn unknown_label(name: &str, labels: &[String], place: &Place) -> Error {
     const SHOWN: usize = 12;
     let mut list = labels.iter().take(SHOWN).map(|l| format!("`{l}`")).collect::<Vec<_>>().join(", ");
     if labels.len() > SHOWN {
@@ -95,6 +96,14 @@ pub fn units_against(pairs: &[Pair], units: Units, fit: &FitSpec) -> Result<()> 
     }
     let size = |points: Vec<[f64; 3]>| spread(&points);
     let ratio = size(pairs.iter().map(|p| p.0).collect()) / size(pairs.iter().map(|p| p.1).collect());
+    size_against(ratio, pairs.len(), units, fit)
+}
+
+/// Whether a recording of so many labels is `ratio` times the size of the model because its units are wrong.
+///
+/// # Errors
+/// [`Error::UnitsLookWrong`].
+pub(super) fn size_against(ratio: f64, labels: usize, units: Units, fit: &FitSpec) -> Result<()> {
     // a body does not grow or shrink threefold, and no two units lie closer
     if !ratio.is_finite() || (1.0 / 3.0..3.0).contains(&ratio) {
         return Ok(());
@@ -104,7 +113,7 @@ pub fn units_against(pairs: &[Pair], units: Units, fit: &FitSpec) -> Result<()> 
     let likely = Units::ALL.into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
     Err(Error::UnitsLookWrong {
         ratio,
-        labels: pairs.len(),
+        labels,
         declared: units.name(),
         // a unit that leaves the sizes more than twofold apart explains nothing
         likely: likely.filter(|likely| off(*likely) < 0.3).map(Units::name),

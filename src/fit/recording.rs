@@ -1,8 +1,8 @@
 //! The recording that a fit names, and which of its frames it asks for.
 
 use crate::error::{Error, Result};
-use crate::markers::{self, ReadOptions, Recording};
-use crate::scene::{FitSpec, FramesSpec, Units};
+use crate::markers::{self, Poses, ReadOptions, Recording, read_poses, read_poses_bytes};
+use crate::scene::{FitSpec, FramesSpec, HeadSpec, Units};
 
 /// How a fit wants its recording read.
 pub fn options(fit: &FitSpec) -> ReadOptions {
@@ -23,6 +23,21 @@ pub fn options(fit: &FitSpec) -> ReadOptions {
 pub fn read(fit: &FitSpec) -> Result<Recording> {
     markers::read(&fit.markers, &options(fit))
         .map_err(|error| Error::Named(Box::new((error, fit.markers_place.clone()))))
+}
+
+/// The poses of the head, where a fit takes its motion from a topic; on the clock of the recording.
+///
+/// # Errors
+/// Whatever is wrong with the topic, with the place that names it.
+pub fn poses(fit: &FitSpec, recording: &Recording, embedded: Option<&[u8]>) -> Result<Option<Poses>> {
+    let HeadSpec::PoseTopic(topic) = &fit.registration.head else { return Ok(None) };
+    let (path, clock, options) = (&recording.source.path, recording.source.clock, options(fit));
+    let poses = match embedded {
+        Some(bytes) => read_poses_bytes(path, bytes, topic, clock, &options),
+        None => read_poses(path, topic, clock, &options),
+    };
+    let place = fit.registration.head_place.clone();
+    poses.map(Some).map_err(|error| Error::Named(Box::new((error, place))))
 }
 
 /// The frames of a recording that a fit asks for.

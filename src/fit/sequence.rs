@@ -3,6 +3,7 @@
 use super::covariance::{Bound, standard_deviations};
 use super::estimate::{Estimate, Memory, Optimum};
 use super::frame::{Aims, Directions, FrameProblem, Measured};
+use super::free_head;
 use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
 use super::identifiability::Evidence;
 use super::objective::{Objectives, Past};
@@ -15,7 +16,7 @@ use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Control, Model, State};
-use crate::scene::{ControlValue, Curves, FitSpec, ReuseSpec, Scene, SensitivitySpec};
+use crate::scene::{ControlValue, Curves, FitSpec, HeadSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
@@ -42,6 +43,8 @@ pub struct Fit<'m> {
     pub(super) before: Vec<Past>,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
     pub(super) known_sd: bool,
+    /// Whether the motion of the head is estimated too.
+    pub(super) free_head: bool,
     /// The equilibrium of the last frame, and the sensitivities there.
     pub(super) last: Equilibrium,
     pub(super) directions: Option<Directions>,
@@ -84,6 +87,7 @@ impl<'m> Fit<'m> {
         };
         Ok(Fit {
             known_sd: markers.iter().all(|m| m.sd.is_some()),
+            free_head: fit.registration.head == HeadSpec::Estimate,
             solver,
             markers,
             unknowns,
@@ -158,8 +162,8 @@ impl<'m> Fit<'m> {
     /// from the last good one.
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
         let (measured_mm, measured) = self.shown(recording, frame)?;
-        let optimum = self.optimise(frame, recording.frames[frame].time_s, measured)?;
-        Ok(self.estimate(recording, frame, measured_mm, optimum))
+        let optimum = self.optimise(frame, recording.frames[frame].time_s, measured.clone())?;
+        Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
     }
 
     /// The estimate of a frame for controls that are known, one for each that is sought: nothing is searched.
@@ -168,15 +172,17 @@ impl<'m> Fit<'m> {
     /// A frame without markers, an equilibrium that is not found.
     pub fn at(&mut self, recording: &Recording, frame: usize, q: Vec<f64>) -> Result<Estimate> {
         let (measured_mm, measured) = self.shown(recording, frame)?;
-        let problem = self.problem(recording.frames[frame].time_s, measured);
+        let problem = self.problem(recording.frames[frame].time_s, measured.clone());
         let residuals = problem.apply(&q).map_err(own_error)?;
         // asked again at the same place it is taken anew, if it was kept from another
         problem.jacobian(&q).map_err(own_error)?;
         let jacobian = problem.jacobian(&q).map_err(own_error)?;
+        let held_head = problem.take_held_head();
         let (equilibrium, directions) = problem.into_equilibrium();
         let cost = self.objectives.loss.cost(&residuals);
-        let optimum = Optimum { equilibrium, directions, jacobian, residuals, cost, iterations: Vec::new() };
-        Ok(self.estimate(recording, frame, measured_mm, optimum))
+        let optimum =
+            Optimum { equilibrium, directions, jacobian, held_head, residuals, cost, iterations: Vec::new() };
+        Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
     }
 
     /// Positions of all markers in a frame, and of those that it shows with their weights.
@@ -194,10 +200,18 @@ impl<'m> Fit<'m> {
     /// The same of a frame that must show some.
     fn shown(&self, recording: &Recording, frame: usize) -> Result<Shown> {
         let (all, measured) = self.measured(recording, frame);
-        match measured.is_empty() {
-            true => Err(Error::NoMarkersInFrame { frame, time_s: recording.frames[frame].time_s }),
-            false => Ok((all, measured)),
+        let time_s = recording.frames[frame].time_s;
+        if measured.is_empty() {
+            return Err(Error::NoMarkersInFrame { frame, time_s });
         }
+        if self.free_head {
+            let mesh = self.solver.model().mesh();
+            let rest: Vec<[f64; 3]> = measured.iter().map(|m| mesh.position(self.markers[m.marker].point)).collect();
+            if free_head::nearest(&rest, &measured).is_none() {
+                return Err(Error::HeadNotSeen { frame, time_s, markers: measured.len() });
+            }
+        }
+        Ok((all, measured))
     }
 
     /// What is known at the end of a frame, which the next one starts from.
@@ -205,7 +219,7 @@ impl<'m> Fit<'m> {
         &mut self,
         recording: &Recording,
         frame: usize,
-        measured_mm: Vec<Option<[f64; 3]>>,
+        (mut measured_mm, measured): Shown,
         optimum: Optimum,
     ) -> Estimate {
         let time_s = recording.frames[frame].time_s;
@@ -221,6 +235,13 @@ impl<'m> Fit<'m> {
         let x = model.current(&self.last.state);
         let positions_mm: Vec<[f64; 3]> =
             self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
+        let shown: Vec<[f64; 3]> = measured.iter().map(|m| positions_mm[m.marker]).collect();
+        let back = if self.free_head { free_head::nearest(&shown, &measured) } else { None };
+        let head = back.zip(optimum.held_head).map(|(back, held)| {
+            measured_mm.iter_mut().flatten().for_each(|z| *z = back.place(*z));
+            let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
+            free_head::describe(&back, &measured, &held, &sought, variance)
+        });
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
         let estimate = Estimate {
@@ -243,6 +264,7 @@ impl<'m> Fit<'m> {
             residuals: optimum.residuals,
             variance,
             bridged: false,
+            head,
         };
         self.remember(&estimate);
         estimate
@@ -262,6 +284,7 @@ impl<'m> Fit<'m> {
             self.last.clone(),
             self.directions.clone(),
         )
+        .with_free_head(self.free_head)
     }
 
     /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
@@ -296,9 +319,10 @@ impl<'m> Fit<'m> {
         let residuals = result.state.take_residuals();
         match (reason, result.problem.take_problem(), result.state.take_jacobian().zip(residuals)) {
             (None, Some(problem), Some((jacobian, residuals))) => {
+                let held_head = problem.take_held_head();
                 let (equilibrium, directions) = problem.into_equilibrium();
                 let cost = 0.5 * residuals.iter().map(|r| r * r).sum::<f64>();
-                Ok(Optimum { equilibrium, directions, jacobian, residuals, cost, iterations })
+                Ok(Optimum { equilibrium, directions, jacobian, held_head, residuals, cost, iterations })
             }
             (reason, ..) => Err(Error::FitNotConverged {
                 frame,
@@ -340,7 +364,8 @@ impl<'m> Fit<'m> {
         let bounds: Vec<Bound> = values.zip(self.solver.model().controls()).map(bound).collect();
         let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
         let free = sought.iter().filter(|b| **b == Bound::Free).count();
-        let residuals = optimum.residuals.len();
+        // where the head is estimated it takes six of them
+        let residuals = optimum.residuals.len().saturating_sub(if self.free_head { 6 } else { 0 });
         let variance = if self.known_sd {
             Some(1.0)
         } else {

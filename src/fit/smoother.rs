@@ -56,6 +56,8 @@ struct At {
     equilibrium: Equilibrium,
     residuals: Vec<f64>,
     jacobian: DMatrix<f64>,
+    /// The derivative with the head held, where that is free.
+    held_head: Option<DMatrix<f64>>,
 }
 
 impl<'m> Fit<'m> {
@@ -178,6 +180,7 @@ impl<'m> Fit<'m> {
                 equilibrium: estimate.equilibrium.clone(),
                 residuals: estimate.residuals.clone(),
                 jacobian: estimate.jacobian.clone(),
+                held_head: None,
             });
             Node { frame: *frame, time_s: time(at), a: between(at), measured, measured_mm, at: at_equilibrium }
         };
@@ -284,14 +287,16 @@ impl<'m> Fit<'m> {
             (drive, aims),
             from.clone(),
             None,
-        );
+        )
+        .with_free_head(self.free_head);
         let residuals = problem.apply(&q).map_err(own_error)?;
         let jacobian = match derive {
             true => problem.jacobian(&q).map_err(own_error)?,
             false => DMatrix::zeros(0, 0),
         };
+        let held_head = problem.take_held_head();
         let equilibrium = problem.into_found().0;
-        Ok(At { equilibrium, residuals, jacobian })
+        Ok(At { equilibrium, residuals, jacobian, held_head })
     }
 
     /// What is known of every frame at the end.
@@ -314,7 +319,7 @@ impl<'m> Fit<'m> {
         for (t, node) in nodes.into_iter().enumerate() {
             let bridged = node.at.is_none();
             let found = match node.at {
-                Some(at) => Ok(At { equilibrium: at.equilibrium, residuals: at.residuals, jacobian: at.jacobian }),
+                Some(at) => Ok(at),
                 None => {
                     let from =
                         near.clone().ok_or(Error::NoMarkersInFrame { frame: node.frame, time_s: node.time_s })?;
@@ -342,9 +347,9 @@ impl<'m> Fit<'m> {
             let marginal = DMatrix::from_fn(n, n, |a, b| marginal[(a, b)] / (sizes[a] * sizes[b]));
             let iterations = fitted[t].as_ref().map_or_else(Vec::new, |estimate| estimate.iterations.clone());
             let cost = 0.5 * at.residuals.iter().map(|r| r * r).sum::<f64>();
-            let At { equilibrium, residuals, jacobian } = at;
-            let optimum = Optimum { equilibrium, directions: None, jacobian, residuals, cost, iterations };
-            let mut estimate = self.estimate(recording, node.frame, node.measured_mm, optimum);
+            let At { equilibrium, residuals, jacobian, held_head } = at;
+            let optimum = Optimum { equilibrium, directions: None, jacobian, held_head, residuals, cost, iterations };
+            let mut estimate = self.estimate(recording, node.frame, (node.measured_mm, node.measured), optimum);
             if bridged {
                 // its markers have not been used
                 estimate.weights.fill(0.0);

@@ -2,11 +2,12 @@
 
 use super::fields::SchemaRecord;
 use super::json::Json;
+use super::named::{MARKER_ARRAY, POINT_CLOUD, POSE_ARRAY, SCENE_UPDATE};
 use super::ros2::Ros2;
 use crate::error::{Fault, Unreadable};
 
 /// Every format, asked in this order.
-const FORMATS: [&dyn Format; 2] = [&Ros2, &Json];
+const FORMATS: [&dyn Format; 6] = [&Ros2, &Json, &MARKER_ARRAY, &POSE_ARRAY, &POINT_CLOUD, &SCENE_UPDATE];
 
 /// A way in which messages carry markers. The schema in the file decides whether it is this one.
 pub(super) trait Format: Sync {

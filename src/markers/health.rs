@@ -20,6 +20,8 @@ pub enum Clock {
     Publish,
     /// The time at which the message was recorded.
     Log,
+    /// The time in a file that holds no messages.
+    File,
 }
 
 impl fmt::Display for Clock {
@@ -28,6 +30,7 @@ impl fmt::Display for Clock {
             Clock::Header => "header stamp",
             Clock::Publish => "publish time",
             Clock::Log => "log time",
+            Clock::File => "time in the file",
         })
     }
 }

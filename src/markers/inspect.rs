@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::container::Container;
+use super::files;
 use super::format;
 use super::health::{Clock, Health, LabelHealth, Warning};
-use super::read::{ReadOptions, decode, load};
+use super::read::{ReadOptions, decode, load, read_file};
 use super::recording::Recording;
 use super::topic::readers;
 use crate::error::{Missing, Result, Topic, Unguarded};
@@ -21,7 +22,7 @@ const PLAUSIBLE_MM: [f64; 2] = [20.0, 600.0];
 /// Gaps that are printed; all of them are in [`Health::gaps`].
 const GAPS_SHOWN: usize = 5;
 
-/// What an MCAP file holds.
+/// What a file holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The file.
@@ -75,7 +76,7 @@ pub struct Extent {
     pub plausible_units: Vec<Units>,
 }
 
-/// Says what is in an MCAP file. Files that are cut short or without checksums are inspected with a warning.
+/// Says what is in an MCAP, C3D, TRC or CSV file. Files that are cut short or without checksums are inspected with a warning.
 ///
 /// Errors: M001 (not an MCAP), M002 (damaged), O001 (cannot be read).
 pub fn inspect(path: &Path) -> Result<Inspection> {
@@ -84,6 +85,22 @@ pub fn inspect(path: &Path) -> Result<Inspection> {
 
 /// [`inspect`] for a file that is already in memory; `path` names it.
 pub fn inspect_bytes(path: &Path, bytes: &[u8]) -> Result<Inspection> {
+    if let Some(format) = files::kind(path) {
+        let options = ReadOptions { allow_truncated: true, ..ReadOptions::default() };
+        let recording = read_file(format, path, bytes, &options)?;
+        let mut contents = Contents::of(recording);
+        let cut = |warning: &Warning| matches!(warning, Warning::Truncated { .. });
+        let truncated = contents.health.warnings.iter().position(cut).map(|k| contents.health.warnings.remove(k));
+        return Ok(Inspection {
+            path: path.into(),
+            bytes: bytes.len() as u64,
+            chunks: BTreeMap::new(),
+            topics: Vec::new(),
+            markers: vec![MarkerTopic { topic: format.name().into(), contents: Ok(contents) }],
+            truncated,
+            unchecked: None,
+        });
+    }
     let container =
         Container::read(path, bytes, &|channel, schema| format::decoder(schema, &channel.encoding).is_ok())?;
     let (mut topics, mut markers) = (Vec::new(), Vec::new());
@@ -164,7 +181,9 @@ fn bounds(points: impl Iterator<Item = [f64; 3]>) -> Option<[[f64; 3]; 2]> {
 impl fmt::Display for Inspection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {} bytes, ", self.path.display(), self.bytes)?;
-        if self.chunks.is_empty() {
+        if self.topics.is_empty() && !self.markers.is_empty() {
+            write!(f, "without checksums")?;
+        } else if self.chunks.is_empty() {
             write!(f, "no chunks")?;
         }
         let mut separator = "";
@@ -180,7 +199,9 @@ impl fmt::Display for Inspection {
         if let Some(part) = &self.unchecked {
             writeln!(f, "warning: damage would go unseen: {part}")?;
         }
-        writeln!(f, "topics")?;
+        if !self.topics.is_empty() {
+            writeln!(f, "topics")?;
+        }
         for topic in &self.topics {
             writeln!(f, "  {topic}")?;
         }

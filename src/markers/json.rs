@@ -126,7 +126,7 @@ where
 }
 
 /// Offset of a line (from 1) and a column (from 1; 0 at the start of a line).
-fn byte_offset(text: &[u8], line: usize, column: usize) -> usize {
+pub(super) fn byte_offset(text: &[u8], line: usize, column: usize) -> usize {
     let lines = text.split_inclusive(|byte| *byte == b'\n').take(line.saturating_sub(1));
     lines.map(<[u8]>::len).sum::<usize>() + column.saturating_sub(1)
 }

@@ -11,10 +11,15 @@
 
 mod container;
 mod fields;
+mod files;
 mod format;
 mod health;
 mod inspect;
 mod json;
+mod message;
+mod named;
+mod pose;
+mod protobuf;
 mod read;
 mod recording;
 mod ros2;
@@ -25,6 +30,7 @@ pub use crate::error::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Un
 pub use crate::scene::Units;
 pub use health::{Clock, Gap, Health, LabelHealth, Warning};
 pub use inspect::{Contents, Extent, Inspection, MarkerTopic, inspect, inspect_bytes};
+pub use pose::{Poses, read_poses, read_poses_bytes};
 pub use read::{ReadOptions, read, read_bytes};
 pub use recording::{Frame, Recording, Source};
 pub use write::{Compression, WriteOptions, write_json};

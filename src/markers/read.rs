@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::container::{Container, Message};
-use super::format;
+use super::files::{self, FileFormat};
+use super::format::{self, DecodeFault, Observation};
 use super::health::{Clock, Health, Timing, Warning, seconds};
 use super::recording::{Collector, Frame, Recording, Source};
 use super::topic::{Reader, readers};
@@ -39,38 +40,52 @@ impl Default for ReadOptions {
     }
 }
 
-/// Reads the markers of one topic of an MCAP file.
+/// Reads the markers of one topic of an MCAP file, or of a C3D, TRC or CSV file.
 ///
-/// Errors: M001 to M012 and O001, each with its numbers; see [`crate::Error`].
+/// Errors: M001 to M012, M015 and O001, each with its numbers; see [`crate::Error`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Recording> {
     read_bytes(path, &load(path)?, options)
 }
 
-/// [`read`] for a file that is already in memory; `path` names it in messages.
+/// [`read`] for a file that is already in memory; `path` names it in messages, and tells C3D, TRC and CSV by its end.
 pub fn read_bytes(path: &Path, bytes: &[u8], options: &ReadOptions) -> Result<Recording> {
+    if let Some(format) = files::kind(path) {
+        let recording = read_file(format, path, bytes, options)?;
+        return with_samples(recording);
+    }
     let container = Container::read(path, bytes, &|channel, schema| {
         let named = options.topic.as_ref().is_none_or(|topic| *topic == channel.topic);
         named && format::decoder(schema, &channel.encoding).is_ok()
     })?;
-    if !options.allow_truncated {
-        whole(path, &container, options)?;
-    }
-    if let Some(part) = container.unguarded.filter(|_| !options.allow_unchecked) {
-        return Err(Error::UncheckedRecording { path: path.into(), part });
-    }
+    admit(path, &container, options)?;
     let reader = choose(path, readers(&container), options)?;
-    let recording = decode(path, &container, &reader, options)?;
-    if recording.health.labels.iter().all(|label| label.present == 0) {
-        let missing = recording.health.labels.iter().map(|label| label.missing);
-        return Err(Error::NoSamples {
-            path: path.into(),
-            topic: reader.topic.name,
-            frames: recording.frames.len(),
-            labels: recording.labels.len(),
-            missing: missing.fold(Missing::default(), Missing::plus),
-        });
+    with_samples(decode(path, &container, &reader, options)?)
+}
+
+/// A recording that shows something.
+fn with_samples(recording: Recording) -> Result<Recording> {
+    if recording.health.labels.iter().any(|label| label.present > 0) {
+        return Ok(recording);
     }
-    Ok(recording)
+    let missing = recording.health.labels.iter().map(|label| label.missing);
+    Err(Error::NoSamples {
+        path: recording.source.path,
+        topic: recording.source.topic,
+        frames: recording.frames.len(),
+        labels: recording.labels.len(),
+        missing: missing.fold(Missing::default(), Missing::plus),
+    })
+}
+
+/// An error for a file that is cut short or unchecked, unless that was allowed.
+pub(super) fn admit(path: &Path, container: &Container, options: &ReadOptions) -> Result<()> {
+    if !options.allow_truncated {
+        whole(path, container, options)?;
+    }
+    match container.unguarded.filter(|_| !options.allow_unchecked) {
+        Some(part) => Err(Error::UncheckedRecording { path: path.into(), part }),
+        None => Ok(()),
+    }
 }
 
 /// The bytes of a file.
@@ -110,9 +125,7 @@ fn choose(path: &Path, mut readers: BTreeMap<String, Reader>, options: &ReadOpti
         }
     };
     let Some(reader) = readers.remove(&name) else {
-        let closeness = |topic: &&Topic| strsim::jaro_winkler(&topic.name, &name);
-        let nearest = all.iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b)));
-        let nearest = nearest.filter(|topic| closeness(topic) > 0.7).map(|topic| topic.name.clone());
+        let nearest = nearest_topic(&all, &name);
         return Err(Error::TopicNotFound { path: path.into(), topic: name, nearest, topics: all });
     };
     if let Some(reason) = reader.fault {
@@ -122,6 +135,25 @@ fn choose(path: &Path, mut readers: BTreeMap<String, Reader>, options: &ReadOpti
         return Err(Error::EmptyTopic { path: path.into(), topic: name });
     }
     Ok(reader)
+}
+
+/// The topic with the most similar name, if one is similar.
+pub(super) fn nearest_topic(topics: &[Topic], name: &str) -> Option<String> {
+    let closeness = |topic: &&Topic| strsim::jaro_winkler(&topic.name, name);
+    let nearest = topics.iter().max_by(|a, b| closeness(a).total_cmp(&closeness(b)));
+    nearest.filter(|topic| closeness(topic) > 0.7).map(|topic| topic.name.clone())
+}
+
+/// A message that does not hold what its schema promises.
+pub(super) fn undecodable(path: &Path, topic: &str, message: &Message, found: DecodeFault) -> Error {
+    let (path, topic, sequence) = (path.into(), topic.to_owned(), message.sequence);
+    match found.fault {
+        Fault::Encapsulation { id } => Error::UnsupportedEncapsulation { path, topic, sequence, id },
+        fault => {
+            let log_time_ns = message.log_time;
+            Error::Undecodable { path, topic, sequence, log_time_ns, byte: found.byte, fault }
+        }
+    }
 }
 
 /// Decodes all messages of a topic.
@@ -138,29 +170,14 @@ pub(super) fn decode(
         let Some(decoder) = reader.decoders.get(&message.channel) else {
             continue;
         };
-        let observation = decoder.decode(&message.payload).map_err(|found| {
-            let (path, topic, sequence) = (path.into(), reader.topic.name.clone(), message.sequence);
-            match found.fault {
-                Fault::Encapsulation { id } => Error::UnsupportedEncapsulation { path, topic, sequence, id },
-                fault => Error::Undecodable {
-                    path,
-                    topic,
-                    sequence,
-                    log_time_ns: message.log_time,
-                    byte: found.byte,
-                    fault,
-                },
-            }
-        })?;
+        let observation = decoder
+            .decode(&message.payload)
+            .map_err(|found| undecodable(path, &reader.topic.name, message, found))?;
         messages.push((message, observation.stamp_ns));
         collector.add(observation);
     }
     let (clock, stamps) = clock(&messages);
     let stamped = messages.iter().filter(|(_, stamp)| stamp.is_some()).count();
-    let (unlabelled_samples, units_declared) = (collector.unlabelled, collector.units.clone());
-    let ((labels, positions, label_health), zeros_kept) =
-        collector.finish(options.units.mm(), options.zero_is_missing);
-
     let mut warnings = Vec::new();
     warnings.extend(container.truncated.map(|cut| Warning::Truncated { offset: cut.offset, bytes: cut.bytes }));
     warnings.extend(container.unguarded.map(|part| Warning::Unchecked { part }));
@@ -170,9 +187,70 @@ pub(super) fn decode(
     if clock != Clock::Header {
         warnings.push(Warning::ClockFallback { stamped, messages: messages.len(), used: clock });
     }
+    let source = Source {
+        path: path.into(),
+        topic: reader.topic.name.clone(),
+        schema: reader.topic.schema.clone(),
+        schema_encoding: reader.topic.schema_encoding.clone(),
+        message_encoding: reader.topic.message_encoding.clone(),
+        format: reader.topic.markers.clone().unwrap_or_default(),
+        compression: container.compression.clone(),
+        units_declared: collector.units.clone(),
+        units: options.units,
+        clock,
+    };
+    Ok(recording(source, collector, stamps, warnings, options))
+}
+
+/// Reads a file that holds markers and nothing else.
+pub(super) fn read_file(
+    format: &dyn FileFormat,
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions,
+) -> Result<Recording> {
+    if let Some(topic) = &options.topic {
+        let (path, topic) = (path.into(), topic.clone());
+        return Err(Error::TopicNotFound { path, topic, nearest: None, topics: Vec::new() });
+    }
+    let tracks = files::read(format, path, bytes, options.allow_truncated)?;
+    let mut collector = Collector::default();
+    collector.units = tracks.units;
+    for samples in tracks.frames {
+        collector.add(Observation { stamp_ns: None, unit: None, samples });
+    }
+    let source = Source {
+        path: path.into(),
+        topic: String::new(),
+        schema: String::new(),
+        schema_encoding: String::new(),
+        message_encoding: String::new(),
+        format: format.name().into(),
+        compression: BTreeMap::new(),
+        units_declared: collector.units.clone(),
+        units: options.units,
+        clock: Clock::File,
+    };
+    let length = bytes.len() as u64;
+    let warnings = tracks.truncated.then_some(Warning::Truncated { offset: length, bytes: length });
+    Ok(recording(source, collector, tracks.stamps_ns, warnings.into_iter().collect(), options))
+}
+
+/// A recording of what was collected, with its health.
+fn recording(
+    source: Source,
+    collector: Collector,
+    stamps: Vec<i64>,
+    mut warnings: Vec<Warning>,
+    options: &ReadOptions,
+) -> Recording {
+    let unlabelled_samples = collector.unlabelled;
+    let ((labels, positions, label_health), zeros_kept) =
+        collector.finish(options.units.mm(), options.zero_is_missing);
     let disagrees = |declared: &&String| Units::from_name(declared) != Some(options.units);
     warnings.extend(
-        units_declared
+        source
+            .units_declared
             .iter()
             .filter(disagrees)
             .map(|declared| Warning::UnitsDisagree { declared: declared.clone(), used: options.units }),
@@ -197,19 +275,7 @@ pub(super) fn decode(
         labels: label_health,
         warnings,
     };
-    let source = Source {
-        path: path.into(),
-        topic: reader.topic.name.clone(),
-        schema: reader.topic.schema.clone(),
-        schema_encoding: reader.topic.schema_encoding.clone(),
-        message_encoding: reader.topic.message_encoding.clone(),
-        format: reader.topic.markers.clone().unwrap_or_default(),
-        compression: container.compression.clone(),
-        units_declared,
-        units: options.units,
-        clock,
-    };
-    Ok(Recording { source, labels, frames, health })
+    Recording { source, labels, frames, health }
 }
 
 /// One clock for the whole recording: the stamp in the message if every message has one, else publish time, else log

@@ -128,20 +128,30 @@ pub fn spread(points: &[Vector]) -> f64 {
 /// The motion with the least sum of squared distances. `None` below three pairs, and where either side lies on a line, so
 /// that a turn about it is not determined.
 pub fn least_squares(pairs: &[Pair], allowed: Allowed) -> Option<Motion> {
+    weighted(pairs, |_| 1.0, allowed)
+}
+
+/// As [`least_squares`], of squared distances times the `weight` of each pair.
+pub fn weighted(pairs: &[Pair], weight: impl Fn(usize) -> f64, allowed: Allowed) -> Option<Motion> {
     if pairs.len() < 3 {
         return None;
     }
-    let (from, to) = (centre(pairs.iter().map(|p| p.0)), centre(pairs.iter().map(|p| p.1)));
+    let total: f64 = (0..pairs.len()).map(&weight).sum();
+    let mean = |of: fn(&Pair) -> Vector| {
+        pairs.iter().enumerate().fold([0.0; 3], |sum, (k, pair)| add_scaled(sum, weight(k) / total, of(pair)))
+    };
+    let (from, to) = (mean(|p| p.0), mean(|p| p.1));
     let mut covariance = Matrix3::zeros();
     let mut square = 0.0;
-    for (x, y) in pairs {
+    for (k, (x, y)) in pairs.iter().enumerate() {
         let (x, y) = (subtract(*x, from), subtract(*y, to));
-        covariance += Matrix3::from_fn(|i, j| y[i] * x[j]);
-        square += x.iter().map(|x| x * x).sum::<f64>();
+        let w = weight(k);
+        covariance += Matrix3::from_fn(|i, j| w * y[i] * x[j]);
+        square += w * x.iter().map(|x| x * x).sum::<f64>();
     }
     let svd = covariance.svd(true, true);
     let (u, v, d) = (svd.u?, svd.v_t?, svd.singular_values);
-    if !(d[1] > 1e-9 * d[0]) {
+    if d[1] <= 1e-9 * d[0] || d[1].is_nan() {
         return None;
     }
     let proper = u.determinant() * v.determinant() > 0.0;
@@ -194,7 +204,7 @@ pub fn robust(pairs: &[Pair], allowed: Allowed, least: f64) -> Option<Agreed> {
             let chosen: Vec<Pair> = best.iter().map(|k| pairs[*k]).collect();
             let Some(next) = least_squares(&chosen, allowed) else { break };
             let (lower, order) = trimmed(&next);
-            if !(lower < cost) {
+            if lower >= cost {
                 break;
             }
             (motion, cost, best) = (next, lower, order);

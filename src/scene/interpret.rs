@@ -56,6 +56,7 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         }
         if let (Some(Some(fit)), Some(markers), true) = (&fit, &markers, fitting) {
             objectives::need_deviations(fit, markers, mistakes);
+            objectives::agree_with_head(fit, mistakes);
         }
         let solver = file.or("solver", SolverSpec::default(), |item| item.table(solver));
         let output = file.or("output", OutputSpec::default(), |item| item.table(output));

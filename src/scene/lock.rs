@@ -427,7 +427,8 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         objectives,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
-        registration: RegistrationSpec { register, neutral, axes, register_place: _, neutral_place: _ },
+        registration:
+            RegistrationSpec { register, neutral, axes, head, head_place: _, register_place: _, neutral_place: _ },
         tolerance,
         max_iterations,
         finite_difference_step,
@@ -473,6 +474,15 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         format!("max_iterations = {max_iterations}"),
         format!("finite_difference_step = {}", number(*finite_difference_step)),
     ]);
+    let quoted = |labels: &[String]| labels.iter().map(|label| text(label)).collect::<Vec<_>>().join(", ");
+    match head {
+        HeadSpec::None => {}
+        HeadSpec::BoneMarkers(labels) => {
+            lines.extend(["\n[fit.head]".into(), format!("bone_markers = [{}]", quoted(labels))]);
+        }
+        HeadSpec::Estimate => lines.extend(["\n[fit.head]".into(), "estimate = true".into()]),
+        HeadSpec::PoseTopic(topic) => lines.extend(["\n[fit.head]".into(), format!("pose_topic = {}", text(topic))]),
+    }
     for PriorSpec { csv, sd, gain, delay_s } in &objectives.priors {
         lines.extend(["\n[[fit.prior]]".into(), format!("csv = {}", path(csv)), format!("sd = {}", number(*sd))]);
         lines.extend([format!("gain = {}", number(*gain)), format!("delay_s = {}", number(*delay_s))]);

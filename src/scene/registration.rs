@@ -1,7 +1,7 @@
-//! How a recording is brought to the model: `[fit] register`, `neutral` and `axes`.
+//! How a recording is brought to the model: `[fit] register`, `neutral`, `axes` and `head`.
 
-use super::cursor::{Item, Table};
-use super::spec::{AxisSpec, RegisterSpec, RegistrationSpec};
+use super::cursor::{Item, Reader, Table};
+use super::spec::{AxisSpec, HeadSpec, RegisterSpec, RegistrationSpec};
 use super::tree::Value;
 use super::units::Units;
 
@@ -26,12 +26,46 @@ pub(super) fn registration(table: &mut Table, units: Option<Option<Units>>) -> O
     let neutral_place = table.place_of("neutral");
     let [x, y, z, ..] = AxisSpec::ALL;
     let axes = table.or("axes", [x, y, z], axes);
+    let head_place = table.place_of("head");
+    let head = table.or("head", HeadSpec::None, |item| item.table(head));
     if units == Some(None) && register.is_some_and(|register| register != RegisterSpec::Similarity) {
         return table
             .item("units")?
             .out_of_range("\"estimate\"", "mm, cm or m where register is not \"similarity\", which finds the scale");
     }
-    Some(RegistrationSpec { register: register?, neutral: neutral?, axes: axes?, register_place, neutral_place })
+    Some(RegistrationSpec {
+        register: register?,
+        neutral: neutral?,
+        axes: axes?,
+        head: head?,
+        head_place,
+        register_place,
+        neutral_place,
+    })
+}
+
+/// Fewer bone markers do not say how a head is turned.
+const BONE_MARKERS: usize = 3;
+
+fn head(table: &mut Table) -> Option<HeadSpec> {
+    let markers: Reader<HeadSpec> = |item| {
+        let labels = item.list("a list of labels", |entry| entry.name())?;
+        let mut known = labels.clone();
+        known.sort();
+        known.dedup();
+        if known.len() < BONE_MARKERS {
+            let found = format!("{} different labels", known.len());
+            return item
+                .wrong_length(&found, "at least 3, which do not lie on a line; with 4 one that slips can be told");
+        }
+        Some(HeadSpec::BoneMarkers(known))
+    };
+    let estimate: Reader<HeadSpec> = |item| match item.flag()? {
+        true => Some(HeadSpec::Estimate),
+        false => item.out_of_range("false", "true; without the table the head does not move"),
+    };
+    let topic: Reader<HeadSpec> = |item| item.name().map(HeadSpec::PoseTopic);
+    table.one_of(&[("bone_markers", markers), ("pose_topic", topic), ("estimate", estimate)])
 }
 
 /// Each coordinate once.

@@ -829,6 +829,11 @@ pub struct RegistrationSpec {
     pub neutral: Option<usize>,
     /// The axes of the recording that are x, y and z of the model, before that motion.
     pub axes: [AxisSpec; 3],
+    /// From what the motion of the head is known.
+    pub head: HeadSpec,
+    /// The table `[fit.head]`; that of the fit where there is none.
+    #[serde(skip)]
+    pub head_place: Place,
     /// The word of `register`; the table where there is none.
     #[serde(skip)]
     pub register_place: Place,
@@ -858,6 +863,20 @@ impl RegisterSpec {
             RegisterSpec::Similarity => "similarity",
         }
     }
+}
+
+/// From what the motion of the head in a recording is known: `[fit.head]`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeadSpec {
+    /// It does not move.
+    None,
+    /// From markers that sit on bone, by their labels in the recording.
+    BoneMarkers(Vec<String>),
+    /// From poses in another topic of the recording.
+    PoseTopic(String),
+    /// It is estimated in every frame together with the controls.
+    Estimate,
 }
 
 /// An axis of a recording, or its opposite: `"x"`, `"-x"`, ...

@@ -3,7 +3,7 @@
 use super::norms::Seen;
 use crate::error::Result;
 use crate::fit::placement::Marker;
-use crate::fit::recording::{chosen_frames, read};
+use crate::fit::recording::{chosen_frames, poses, read};
 use crate::fit::sequence::settings;
 use crate::fit::{Estimate, Fit, placement, registration};
 use crate::forward::drives::drives;
@@ -77,7 +77,8 @@ impl Prepared {
                 let frames = chosen_frames(fit, &recording)?;
                 let mesh = built.model.mesh();
                 let markers = placement::place(&scene, fit, mesh, &recording)?;
-                registration::register(&scene, fit, mesh, &markers, &mut recording)?;
+                let poses = poses(fit, &recording, None)?;
+                registration::register(&scene, fit, mesh, &markers, &mut recording, poses.as_ref())?;
                 Some((recording, frames))
             }
             _ => None,

@@ -1,4 +1,5 @@
 //! Writes recordings as other programs do: containers of every kind, ROS 2 markers in both layouts.
+#![allow(dead_code)] // each test uses a part
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -60,33 +61,51 @@ pub fn ros2_message(header: bool, big_endian: bool, stamp_ns: i64, markers: &[Ro
     [&encapsulation[..], &cdr.body].concat()
 }
 
-struct Cdr {
+/// Fields in CDR, one after the other.
+pub struct Cdr {
     body: Vec<u8>,
     big_endian: bool,
 }
 
 impl Cdr {
-    fn header(&mut self, stamp_ns: i64) {
+    pub fn new() -> Cdr {
+        Cdr { body: Vec::new(), big_endian: false }
+    }
+
+    /// The message with its encapsulation.
+    pub fn message(self) -> Vec<u8> {
+        [&[0, u8::from(!self.big_endian), 0, 0], &self.body[..]].concat()
+    }
+
+    pub fn header(&mut self, stamp_ns: i64) {
+        self.stamp(stamp_ns);
+        self.text("lab");
+    }
+
+    pub fn stamp(&mut self, stamp_ns: i64) {
         self.u32(stamp_ns.div_euclid(1_000_000_000) as u32);
         self.u32(stamp_ns.rem_euclid(1_000_000_000) as u32);
-        self.text("lab");
+    }
+
+    pub fn byte(&mut self, value: u8) {
+        self.body.push(value);
     }
 
     fn align(&mut self, size: usize) {
         self.body.resize(self.body.len().next_multiple_of(size), 0);
     }
 
-    fn u32(&mut self, value: u32) {
+    pub fn u32(&mut self, value: u32) {
         self.align(4);
         self.body.extend(if self.big_endian { value.to_be_bytes() } else { value.to_le_bytes() });
     }
 
-    fn f64(&mut self, value: f64) {
+    pub fn f64(&mut self, value: f64) {
         self.align(8);
         self.body.extend(if self.big_endian { value.to_be_bytes() } else { value.to_le_bytes() });
     }
 
-    fn text(&mut self, text: &str) {
+    pub fn text(&mut self, text: &str) {
         self.u32(text.len() as u32 + 1);
         self.body.extend(text.as_bytes());
         self.body.push(0);
@@ -97,7 +116,7 @@ impl Cdr {
 #[derive(Clone)]
 pub struct Topic {
     pub name: &'static str,
-    pub schema: (&'static str, &'static str, String),
+    pub schema: (&'static str, &'static str, Vec<u8>),
     pub encoding: &'static str,
     pub unit: Option<&'static str>,
     pub messages: Vec<Message>,
@@ -113,7 +132,7 @@ pub struct Message {
 
 impl Topic {
     pub fn ros2(header: bool, messages: Vec<Message>) -> Topic {
-        let schema = ("mocap4r2_msgs/msg/Markers", "ros2msg", ros2_schema(header));
+        let schema = ("mocap4r2_msgs/msg/Markers", "ros2msg", ros2_schema(header).into());
         Topic { name: "/markers", schema, encoding: "cdr", unit: None, messages }
     }
 
@@ -149,7 +168,7 @@ pub fn file(options: mcap::WriteOptions, topics: &[Topic]) -> Vec<u8> {
         let (name, encoding, text) = &topic.schema;
         let schema = match *encoding {
             "" => 0,
-            encoding => writer.add_schema(name, encoding, text.as_bytes()).unwrap(),
+            encoding => writer.add_schema(name, encoding, text).unwrap(),
         };
         let metadata: BTreeMap<_, _> = topic.unit.iter().map(|unit| ("unit".into(), unit.to_string())).collect();
         let channel_id = writer.add_channel(schema, topic.name, topic.encoding, &metadata).unwrap();

@@ -170,6 +170,8 @@ fn farthest(neutral: &Neutral<'_>, placed: &Agreed) -> Vec<(String, f64)> {
     let mut order: Vec<usize> = (0..neutral.pairs.len()).collect();
     order.sort_by(|a, b| placed.distances[*b].total_cmp(&placed.distances[*a]));
     order.truncate(NAMED);
+    let worst = order.first().map_or(0.0, |k| placed.distances[*k]);
+    order.retain(|k| placed.distances[*k] > 0.2 * worst);
     order.into_iter().map(|k| (neutral.name(k), placed.distances[k])).collect()
 }
 

@@ -5,16 +5,19 @@
 //! mended that was not asked for.
 
 mod diagnosis;
+mod matching;
 mod mirror;
 mod scale;
 
+pub use matching::{Proposal, propose};
 pub use mirror::{nearest, pairings};
 pub use scale::{Scale, scale};
 
+use super::head::{self, HeadMotion};
 use super::placement::{Marker, units_against};
 use crate::error::{Cause, Error, Misregistration, Result, Warning};
-use crate::markers::Recording;
-use crate::math::motion::{Agreed, Allowed, Motion, Pair, rms, robust, spread};
+use crate::markers::{Poses, Recording};
+use crate::math::motion::{Agreed, Allowed, Motion, Pair, least_squares, rms, robust, spread};
 use crate::math::tensor::{norm, subtract};
 use crate::mesh::Mesh;
 use crate::scene::{AxisSpec, FitSpec, RegisterSpec, Scene};
@@ -41,6 +44,10 @@ pub struct Registration {
     pub markers: Vec<Registered>,
     /// Root mean square distance of those that are not off, mm.
     pub rms_mm: f64,
+    /// How the head moved, where that was taken out.
+    pub head: Option<HeadMotion>,
+    /// Centre of the markers in the neutral frame on the model, mm.
+    pub centre: [f64; 3],
 }
 
 /// A marker of the neutral frame on the model.
@@ -88,25 +95,32 @@ impl Neutral<'_> {
     }
 }
 
-/// Brings a recording to the model as `[fit]` asks: its axes, then the motion that registers its neutral frame.
+/// Brings a recording to the model as `[fit]` asks: its axes, then the head of every frame to where it is in the neutral one,
+/// then the motion that registers that. `poses` are those of the head, where they come from a topic.
 ///
 /// # Errors
-/// K001 and K007 to K012: what keeps the recording from lying on the model, with the edit that mends it.
+/// K001, K002 and K007 to K012: what keeps the recording from lying on the model, with the edit that mends it.
 pub fn register(
     scene: &Scene,
     fit: &FitSpec,
     mesh: &Mesh,
     markers: &[Marker],
     recording: &mut Recording,
+    poses: Option<&Poses>,
 ) -> Result<(Registration, Vec<Warning>)> {
     turn_axes(recording, fit.registration.axes);
-    let (registration, warnings) = registration(scene, fit, mesh, markers, recording)?;
+    let frame = neutral_frame(fit, markers, recording)?;
+    let (head, mut warnings) = head::still(fit, recording, frame, poses)?.unzip();
+    let warnings = warnings.get_or_insert_default();
+    let (mut registration, odd) = registration(scene, fit, mesh, markers, (recording, frame))?;
+    warnings.extend(odd);
+    registration.head = head.map(|head| head.carried(&registration.motion));
     if registration.motion != Motion::REST {
         for position in recording.frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()) {
             *position = registration.motion.place(*position);
         }
     }
-    Ok((registration, warnings))
+    Ok((registration, std::mem::take(warnings)))
 }
 
 /// Takes the axes of a recording as they are called.
@@ -121,11 +135,10 @@ fn registration(
     fit: &FitSpec,
     mesh: &Mesh,
     markers: &[Marker],
-    recording: &Recording,
-) -> Result<(Registration, Vec<Warning>)> {
+    (recording, frame): (&Recording, usize),
+) -> Result<(Registration, Option<Warning>)> {
     let spec = &fit.registration;
     let model: Vec<[f64; 3]> = markers.iter().map(|m| mesh.position(m.point)).collect();
-    let frame = neutral_frame(fit, markers, recording)?;
     let positions = &recording.frames[frame].positions_mm;
     let shown: Vec<usize> = (0..markers.len()).filter(|k| positions[markers[*k].column].is_some()).collect();
     let pairs: Vec<Pair> =
@@ -137,7 +150,7 @@ fn registration(
     }
 
     let allowed = if spec.register == RegisterSpec::Similarity { Allowed::SIMILARITY } else { Allowed::RIGID };
-    let placed = match spec.register {
+    let mut placed = match spec.register {
         RegisterSpec::None => in_place(&neutral),
         RegisterSpec::Rigid | RegisterSpec::Similarity => {
             robust(&neutral.pairs, allowed, OFF * size).ok_or_else(|| {
@@ -146,9 +159,17 @@ fn registration(
             })?
         }
     };
-    let warning = diagnosis::diagnose(&neutral, &placed, allowed)?;
     let agreeing: Vec<Pair> =
         neutral.pairs.iter().zip(&placed.off).filter(|(_, off)| !**off).map(|(p, _)| *p).collect();
+    if spec.register == RegisterSpec::Similarity {
+        // the noise is in the recording: least squares towards it, or the scale would come out too small
+        let back: Vec<Pair> = agreeing.iter().map(|(z, x)| (*x, *z)).collect();
+        if let Some(motion) = least_squares(&back, allowed).map(|motion| motion.inverse()) {
+            placed =
+                Agreed { motion, distances: motion.distances(&neutral.pairs), rms: motion.rms(&agreeing), ..placed };
+        }
+    }
+    let warning = diagnosis::diagnose(&neutral, &placed, allowed)?;
     let markers = (0..neutral.pairs.len())
         .map(|k| Registered { name: neutral.name(k), distance_mm: placed.distances[k], off: placed.off[k] })
         .collect();
@@ -160,8 +181,10 @@ fn registration(
         scale: scale(&agreeing),
         markers,
         rms_mm: placed.rms,
+        head: None,
+        centre: head::middle(&neutral.pairs.iter().map(|p| Some(placed.motion.place(p.0))).collect::<Vec<_>>()),
     };
-    Ok((registration, warning.into_iter().collect()))
+    Ok((registration, warning))
 }
 
 /// The neutral frame as it stands.
@@ -205,7 +228,10 @@ pub fn neutral_frame(fit: &FitSpec, markers: &[Marker], recording: &Recording) -
 impl std::fmt::Display for Registration {
     /// A paragraph of a page.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Registration { register, motion, moved_mm, neutral, scale, markers, rms_mm } = self;
+        let Registration { register, motion, moved_mm, neutral, scale, markers, rms_mm, head, centre } = self;
+        if let Some(head) = head {
+            out.write_str(&head.describe(*centre))?;
+        }
         match register {
             RegisterSpec::None => write!(out, "registration: none, the recording stands where it is")?,
             RegisterSpec::Rigid | RegisterSpec::Similarity => {

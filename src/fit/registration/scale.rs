@@ -38,8 +38,9 @@ fn student(freedom: usize) -> f64 {
         (Z.powi(3) + Z) / 4.0,
         (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / 96.0,
         (3.0 * Z.powi(7) + 19.0 * Z.powi(5) + 17.0 * Z.powi(3) - 15.0 * Z) / 384.0,
+        (79.0 * Z.powi(9) + 776.0 * Z.powi(7) + 1482.0 * Z.powi(5) - 1920.0 * Z.powi(3) - 945.0 * Z) / 92160.0,
     ];
-    Z + g[0] / n + g[1] / n.powi(2) + g[2] / n.powi(3)
+    g.iter().rev().fold(0.0, |sum, g| (sum + g) / n) + Z
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use self::cdr::Value;
 use self::schema::{Count, Field, Kind, Types};
 use super::fields::SchemaRecord;
 use super::format::{DecodeFault, Decoder, Format, Observation, Sample, stamp_ns};
+use super::message::{Payload, Tree};
 use crate::error::{Fault, Unreadable};
 
 /// `mocap4r2_msgs/msg/Markers`.
@@ -84,6 +85,39 @@ impl Layout {
             xyz: [single(point, "x", &float)?, single(point, "y", &float)?, single(point, "z", &float)?],
         };
         (layout.name.is_some() || layout.index.is_some()).then_some(layout)
+    }
+}
+
+/// Any message in CDR.
+pub(super) struct Cdr(Types);
+
+impl Cdr {
+    pub fn new(schema: &SchemaRecord) -> Result<Cdr, Unreadable> {
+        Ok(Cdr(Types::parse(&schema.name, &schema.text)?))
+    }
+
+    /// A field with the names of its parts.
+    fn named(&self, kind: &Kind, value: Value) -> Tree {
+        match (value, kind) {
+            (Value::Bool(flag), _) => Tree::Flag(flag),
+            (Value::Integer(number), _) => Tree::Integer(number),
+            (Value::Unsigned(number), _) => i64::try_from(number).map_or(Tree::Number(number as f64), Tree::Integer),
+            (Value::Float(number), _) => Tree::Number(number),
+            (Value::Text(text), _) => Tree::Text(text),
+            (Value::List(list), _) => Tree::List(list.into_iter().map(|value| self.named(kind, value)).collect()),
+            (Value::Message(values), Kind::Message(index)) => {
+                let fields = self.0.fields(*index).iter().zip(values);
+                Tree::Fields(fields.map(|(f, value)| (f.name.clone(), self.named(&f.kind, value))).collect())
+            }
+            (Value::Message(_), _) => Tree::Nothing,
+        }
+    }
+}
+
+impl Payload for Cdr {
+    fn tree(&self, payload: &[u8]) -> Result<Tree, DecodeFault> {
+        let message = cdr::decode(&self.0, payload)?;
+        Ok(self.named(&Kind::Message(self.0.root()), message))
     }
 }
 

@@ -7,8 +7,10 @@ use crate::fit::advise::MarkerHelp;
 use crate::fit::covariance::Bound;
 use crate::fit::estimate::{FitIteration, Memory};
 use crate::fit::frame::Directions;
+use crate::fit::free_head::FreeHead;
 use crate::fit::objective::Past;
 use crate::forward::{Equilibrium, Snap, Step, StepKind};
+use crate::math::motion::Motion;
 use crate::model::{Evaluation, State, WorstPoint};
 use crate::report::frame::MeshError;
 use crate::report::status::FailedFrame;
@@ -26,6 +28,8 @@ stored!(Directions { columns, fresh });
 stored!(Past { time_s, a, covariance });
 stored!(Memory { last, directions, before, tangent });
 stored!(MarkerHelp { place, control, sd });
+stored!(Motion { scale, turn, shift });
+stored!(FreeHead { motion, sd, correlation, inflation });
 stored!(FailedFrame { frame, code, message });
 stored!(SavedFrame { estimate, error, unestimated, help });
 stored!(Estimate {
@@ -48,6 +52,7 @@ stored!(Estimate {
     gradient,
     variance,
     bridged,
+    head,
 });
 
 impl Stored for StepKind {
