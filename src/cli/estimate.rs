@@ -11,6 +11,14 @@ use crate::model::State;
 use crate::report::summary::MeshErrors;
 use crate::report::{Frame, MeshError, Probe, Record};
 
+/// The outcome of one estimate; neither where none was asked for.
+#[derive(Default)]
+pub(super) struct Estimated {
+    pub error: Option<MeshError>,
+    /// Why there is none.
+    pub warning: Option<Warning>,
+}
+
 /// What a run estimates; nothing where it was not asked for.
 pub(super) struct Estimates<'m> {
     estimator: Option<Estimator<'m>>,
@@ -36,7 +44,7 @@ impl<'m> Estimates<'m> {
 
     /// Estimates the errors of the probes in an equilibrium and writes them; gives the warning where that fails.
     pub fn forward(&mut self, frame: Frame, state: &State, record: &mut Record<'_>) -> Result<Option<Warning>> {
-        self.frame(frame, "probe", state, record, |_| Vec::new())
+        Ok(self.frame(frame, "probe", state, record, |_| Vec::new())?.warning)
     }
 
     /// The same of the markers and of the controls that were fitted.
@@ -47,7 +55,7 @@ impl<'m> Estimates<'m> {
         fit: &Fit<'_>,
         labels: &[String],
         record: &mut Record<'_>,
-    ) -> Result<Option<Warning>> {
+    ) -> Result<Estimated> {
         self.frame(frame, "marker", &fitted.equilibrium.state, record, |shift| {
             let biases = bias(fitted, fit.markers(), fit.unknowns(), shift);
             fit.unknowns().iter().map(|control| (labels[*control].clone(), biases[*control])).collect()
@@ -61,17 +69,18 @@ impl<'m> Estimates<'m> {
         state: &State,
         record: &mut Record<'_>,
         biases: impl FnOnce(&[[f64; 3]]) -> Vec<(String, Option<f64>)>,
-    ) -> Result<Option<Warning>> {
-        let Some(estimator) = &mut self.estimator else { return Ok(None) };
+    ) -> Result<Estimated> {
+        let Some(estimator) = &mut self.estimator else { return Ok(Estimated::default()) };
         let corrected = match estimator.corrected(state) {
             Ok(corrected) => corrected,
             Err(error) => {
-                return Ok(Some(Warning {
+                let warning = Warning {
                     code: "S013",
                     message: format!("frame {}: no estimate of the error: {error}", frame.index),
                     place: None,
                     help: error.help(),
-                }));
+                };
+                return Ok(Estimated { error: None, warning: Some(warning) });
             }
         };
         let shift = estimator.shift(state, &corrected, &self.points);
@@ -83,7 +92,23 @@ impl<'m> Estimates<'m> {
         };
         record.estimate(frame, &error)?;
         self.errors.add(frame, &error, estimator.work().iterations, estimator.seconds());
-        Ok(None)
+        Ok(Estimated { error: Some(error), warning: None })
+    }
+
+    /// Writes what an earlier process had estimated.
+    pub fn known(&mut self, frame: Frame, error: &MeshError, record: &mut Record<'_>) -> Result<()> {
+        record.estimate(frame, error)?;
+        self.errors.add(frame, error, 0, 0.0);
+        Ok(())
+    }
+
+    /// What further estimates depend on.
+    pub fn tangent_states(&self) -> Option<[State; 2]> {
+        self.estimator.as_ref()?.tangent_states()
+    }
+
+    pub fn restore_tangent(&mut self, states: Option<&[State; 2]>) -> Result<()> {
+        self.estimator.as_mut().map_or(Ok(()), |estimator| estimator.restore_tangent(states))
     }
 
     /// Work and seconds, if anything was estimated.

@@ -1,16 +1,15 @@
 //! Task `fit`: activations from a recording, frame after frame.
 
 use super::Flags;
+use super::book::{Beside, Book};
 use super::estimate::Estimates;
 use super::forward::probes;
-use super::noticed::noticed;
 use super::prepare::{Clip, Prepared};
 use super::progress::Meter;
 use super::run::{Run, Tally};
-use super::terminal::print;
 use crate::cli::diagnostics::render_error;
-use crate::error::Result;
-use crate::fit::free_head::{FreeHead, page};
+use crate::error::{Result, Warning};
+use crate::fit::free_head::FreeHead;
 use crate::fit::head::{HeadFrame, HeadMotion};
 use crate::fit::placement::Marker;
 use crate::fit::registration::Registration;
@@ -20,104 +19,153 @@ use crate::forward::Work;
 use crate::markers::Recording;
 use crate::math::motion::Motion;
 use crate::math::tensor::subtract;
-use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors};
+use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
 use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
-use crate::report::{FailedFrame, Frame, MarkerPair, Record};
-use crate::scene::{ControlRange, FitSpec, Scene};
+use crate::report::{FailedFrame, Frame, Record};
+use crate::scene::{ClipSpec, FitSpec, Scene};
 
-/// Fits every frame, writes it, prints the page.
+/// Fits every frame that is not done, keeps and writes it, prints the page.
 pub(super) fn fit(
     scene: &Scene,
     spec: &FitSpec,
     prepared: &Prepared,
     Clip { recording, registration, frames, .. }: &Clip,
-    run: &Run,
-    flags: &Flags,
+    (run, flags): (&Run, &Flags),
+    (checkpoints, left): (&Checkpoints, Option<Left>),
     work: &mut Work,
 ) -> Result<Tally> {
     let built = &prepared.built;
-    let model = &built.model;
     let probes = probes(scene, built);
-    let mut fit = Fit::new(model, scene, spec, recording)?;
-    let names: Vec<String> = fit.markers().iter().map(|m| m.name.clone()).collect();
+    let mut fit = Fit::new(&built.model, scene, spec, recording)?;
     write_registration(&run.folder, &placements(fit.markers(), registration))?;
     if let Some(head) = &registration.head {
         write_head(&run.folder, &heads(head, registration, recording))?;
     }
-    let mut record = Record::create(&run.folder, model, &probes, &scene.output, true)?;
-    let ranges = scene.control_ranges();
-    let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
+    let record = Record::create(&run.folder, &built.model, &probes, &scene.output, true)?;
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
-    let mut estimates = Estimates::new(prepared, settings(scene), placed)?;
+    let estimates = Estimates::new(prepared, settings(scene), placed)?;
+    let mut book = Book::new(&built.model, scene, &fit, record, estimates);
     let mut meter = Meter::new(flags, frames.len());
-    let mut tally = Tally::default();
-    let mut fitted = Vec::new();
-    let mut errors = MarkerErrors::default();
-    let mut heads: Vec<(usize, FreeHead)> = Vec::new();
-    for &index in frames {
+    let mut done = 0;
+    // frames wait for the others where the clip is smoothed
+    let smoothed = spec.objectives.clip == ClipSpec::Smoother;
+    let mut passed: Vec<Option<Estimate>> = Vec::new();
+    if let Some(Left { frames, carried }) = left {
+        done = frames.len();
+        for outcome in frames {
+            match outcome {
+                SavedOutcome::Fitted(saved) if smoothed => passed.push(Some(saved.estimate)),
+                SavedOutcome::Fitted(saved) => {
+                    let SavedFrame { estimate, error, unestimated, help } = *saved;
+                    book.frame(estimate, &fit, Beside::Known { error, unestimated, help }, &mut meter, flags)?;
+                }
+                SavedOutcome::Failed(failed) => {
+                    passed.push(None);
+                    book.tally.failed.push(failed);
+                }
+            }
+            meter.frame("done before".into());
+        }
+        if let Some(Carried { fit: memory, halved }) = carried {
+            fit.restore(memory)?;
+            book.estimates.restore_tangent(halved.as_ref())?;
+        }
+    }
+    for (at, &index) in frames.iter().enumerate().skip(done) {
         if run.is_interrupted() {
-            tally.interrupted = true;
+            book.tally.interrupted = true;
             break;
         }
         let frame = Frame { index, time_s: recording.frames[index].time_s };
         let before = fit.work().linear.factorisations;
-        match fit.frame(recording, index) {
+        let said;
+        let outcome = match fit.frame(recording, index) {
             Ok(estimate) => {
-                let markers = pairs(&names, &estimate);
-                errors.add(frame, &markers);
-                record.frame(frame, &estimate.equilibrium, &estimate.sd, &markers, &estimate.iterations)?;
-                tally.frames_ok += 1;
-                meter.frame(format!(
+                said = format!(
                     "t {:.3} s: rms {:.3} mm, {} steps, {} factorisations",
                     frame.time_s,
                     estimate.rms_mm,
                     estimate.iterations.len(),
                     fit.work().linear.factorisations - before
-                ));
-                tally.warn(frame, noticed(frame, model, &estimate.equilibrium), &mut meter, flags);
-                let warning = estimates.fit(frame, &estimate, &fit, &labels, &mut record)?;
-                tally.warn(frame, warning.into_iter().collect(), &mut meter, flags);
-                heads.extend(estimate.head.clone().map(|head| (index, head)));
-                fitted.push(FittedFrame {
-                    frame,
-                    values: estimate.equilibrium.state.controls.clone(),
-                    deviations: estimate.sd.clone(),
-                    bounds: estimate.bounds.clone(),
-                });
+                );
+                let saved = if smoothed {
+                    passed.push(Some(estimate.clone()));
+                    SavedFrame { estimate, error: None, unestimated: None, help: None }
+                } else {
+                    book.frame(estimate, &fit, Beside::Fresh(&fit), &mut meter, flags)?
+                };
+                SavedOutcome::Fitted(Box::new(saved))
             }
             Err(error) => {
                 meter.say(&render_error(&error, flags.colour()));
-                meter.frame(format!("t {:.3} s: failed", frame.time_s));
-                tally.failed.push(FailedFrame::new(index, &error));
+                said = format!("t {:.3} s: failed", frame.time_s);
+                passed.push(None);
+                let failed = FailedFrame::new(index, &error);
+                book.tally.failed.push(failed.clone());
+                SavedOutcome::Failed(failed)
             }
-        }
-        run.write_running(&tally)?;
+        };
+        checkpoints.save(at, &outcome, &Carried { fit: fit.memory(), halved: book.estimates.tangent_states() })?;
+        meter.frame(said);
+        run.write_running(&book.tally)?;
     }
     meter.finish();
-    *work = fit.work();
-    record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
-    let controls: Vec<&str> = labels.iter().map(String::as_str).collect();
-    let sought: Vec<&str> = fit.unknowns().iter().map(|k| labels[*k].as_str()).collect();
-    if !heads.is_empty() {
-        write_free_head(&run.folder, &sought, &free_heads(&heads, registration, recording))?;
+    if smoothed && !book.tally.interrupted {
+        smooth(&mut fit, recording, (frames, &passed), &mut book, run, (&mut meter, flags))?;
     }
-    let summary = FitSummary {
-        name: &scene.name,
-        recording: &(page(&heads, registration.centre, &sought) + &registration.to_string()),
-        controls: &controls,
-        bones: !model.bones().is_empty(),
-        frames: &fitted,
-        frames_failed: tally.failed.len(),
-        errors: &errors,
-        mesh_errors: &estimates.errors,
-        iterations: work.iterations,
-        seconds: run.start.elapsed().as_secs_f64(),
-        folder: &run.folder.path().display().to_string(),
+    *work = fit.work();
+    let sought: Vec<&str> = fit.unknowns().iter().map(|k| book.labels[*k].as_str()).collect();
+    if !book.heads.is_empty() {
+        write_free_head(&run.folder, &sought, &free_heads(&book.heads, registration, recording))?;
+    }
+    book.finish(scene, (&fit, registration), work, run, (&mut meter, flags))
+}
+
+/// Smooths the clip and writes its frames; those of the pass before where that fails.
+fn smooth(
+    fit: &mut Fit<'_>,
+    recording: &Recording,
+    (frames, passed): (&[usize], &[Option<Estimate>]),
+    book: &mut Book<'_>,
+    run: &Run,
+    (meter, flags): (&mut Meter, &Flags),
+) -> Result<()> {
+    let named = |at: usize| Frame { index: frames[at], time_s: recording.frames[frames[at]].time_s };
+    if passed.iter().all(Option::is_none) {
+        return Ok(());
+    }
+    let estimates = match fit.smooth(recording, frames, passed, &|| run.is_interrupted()) {
+        Ok(Some(smoothed)) => {
+            meter.say(&format!("smoothed over {} frames in {} sweeps\n", frames.len(), smoothed.sweeps.len()));
+            smoothed.frames.into_iter().map(Result::ok).collect()
+        }
+        Ok(None) => {
+            book.tally.interrupted = true;
+            return Ok(());
+        }
+        Err(error) => {
+            meter.say(&render_error(&error, flags.colour()));
+            book.tally.failed.push(FailedFrame::new(frames[0], &error));
+            passed.to_vec()
+        }
     };
-    let text = summary.to_string();
-    run.folder.write("summary.txt", &text)?;
-    print(&text)?;
-    Ok(tally)
+    for (at, estimate) in estimates.into_iter().enumerate() {
+        let Some(estimate) = estimate else { continue };
+        if estimate.bridged {
+            let warning = Warning {
+                code: "F012",
+                message: format!(
+                    "frame {} failed and is bridged: what stands there is what its neighbours say",
+                    frames[at]
+                ),
+                place: None,
+                help: None,
+            };
+            book.tally.warn(named(at), vec![warning], meter, flags);
+        }
+        book.frame(estimate, fit, Beside::Fresh(fit), meter, flags)?;
+    }
+    Ok(())
 }
 
 /// Where each marker sits, and how the neutral frame fits there.
@@ -157,19 +205,4 @@ fn heads(head: &HeadMotion, registration: &Registration, recording: &Recording) 
         markers: frame.markers,
     };
     head.frames.iter().enumerate().map(row).collect()
-}
-
-/// The name of a control, with its unit where it has one.
-fn label(name: &str, ranges: &[ControlRange]) -> String {
-    let unit = ranges.iter().find(|range| range.name == name).map_or("", |range| range.kind.unit());
-    format!("{name} {unit}").trim_end().to_owned()
-}
-
-fn pairs<'n>(names: &'n [String], estimate: &Estimate) -> Vec<MarkerPair<'n>> {
-    names
-        .iter()
-        .zip(&estimate.positions_mm)
-        .zip(&estimate.measured_mm)
-        .map(|((name, model), measured)| MarkerPair { name, model: *model, measured: *measured })
-        .collect()
 }

@@ -3,6 +3,8 @@
 //! Standard output carries results, standard error progress and messages. Exit codes: 0 ok, 2 usage, 3 invalid input,
 //! 4 not converged (what converged is written), 5 warnings under `--strict`, 6 input or output failed, 130 interrupted.
 
+mod advise;
+mod book;
 mod check;
 mod completions;
 pub mod diagnostics;
@@ -20,8 +22,10 @@ mod prepare;
 mod problem;
 mod progress;
 mod report;
+mod resume;
 mod run;
 mod study;
+mod telling;
 mod terminal;
 
 use clap::error::{ContextKind, ContextValue};
@@ -32,6 +36,7 @@ use std::process::ExitCode;
 
 use crate::error::explain::Page;
 use crate::error::{Error, Result, Warning};
+use crate::fit::advise::Criterion;
 use crate::report::export::Format;
 use crate::scene::Units;
 
@@ -66,6 +71,28 @@ enum Command {
         /// What it is about
         #[arg(long, value_enum, default_value_t = Template::Face)]
         template: Template,
+    },
+    /// Go on with a fit after Ctrl-C, a crash or a full disk
+    Resume {
+        /// The folder of the run
+        run: PathBuf,
+    },
+    /// Which further markers would tell more of the controls
+    Advise {
+        /// A fit: problem.toml, or the folder of a run
+        problem: PathBuf,
+        /// How many
+        #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=100))]
+        markers: u16,
+        /// What is to become small
+        #[arg(long, value_enum, default_value_t = Optimal::D)]
+        criterion: Optimal,
+        /// Not nearer than this to another marker
+        #[arg(long, default_value_t = telling::APART_MM, value_name = "MM", value_parser = millimetres)]
+        apart_mm: f64,
+        /// As JSON
+        #[arg(long)]
+        json: bool,
     },
     /// What is in a marker recording, or in the folder of a run
     Inspect {
@@ -174,6 +201,15 @@ struct Flags {
 enum Template {
     /// The face with its fifteen pairs of muscles
     Face,
+}
+
+/// What further markers are chosen for.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Optimal {
+    /// The volume of the error of all controls together
+    D,
+    /// The sum of their variances
+    A,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -304,6 +340,15 @@ fn dispatch(cli: &Cli) -> Result<Ending> {
         Some(Command::Run { problem }) => run::run(problem.as_deref(), &cli.flags),
         Some(Command::Check { problem }) => check::check(problem.as_deref(), &cli.flags),
         Some(Command::New { folder, template }) => new::new(folder, *template),
+        Some(Command::Resume { run }) => resume::resume(run, &cli.flags),
+        Some(Command::Advise { problem, markers, criterion, apart_mm, json }) => {
+            let criterion = match criterion {
+                Optimal::D => Criterion::D,
+                Optimal::A => Criterion::A,
+            };
+            let (markers, apart_mm, json) = (usize::from(*markers), *apart_mm, *json);
+            advise::run(&advise::Question { path: problem, markers, criterion, apart_mm, json }, &cli.flags)
+        }
         Some(Command::Inspect { file, json }) => inspect::inspect(file, *json),
         Some(Command::Markers { command: Markers::Convert { input, output, units, topic } }) => {
             markers::convert(input, output, *units, topic.as_deref(), &cli.flags)

@@ -12,6 +12,7 @@ use crate::forward::Work;
 use crate::model::Model;
 use crate::report::html;
 use crate::report::manifest::Input;
+use crate::report::state::{Checkpoints, Guard, Left};
 use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
 use std::path::{Path, PathBuf};
@@ -38,6 +39,11 @@ pub(super) struct Tally {
 }
 
 impl Tally {
+    /// Keeps what a frame gave notice of in an earlier process.
+    pub fn keep(&mut self, frame: Frame, warnings: &[Warning]) {
+        self.warnings.extend(warnings.iter().map(|warning| FrameWarning::new(frame.index, warning)));
+    }
+
     /// Shows what a frame gave notice of, and keeps it.
     pub fn warn(&mut self, frame: Frame, warnings: Vec<Warning>, meter: &mut Meter, flags: &Flags) {
         for warning in warnings {
@@ -50,6 +56,12 @@ impl Tally {
 }
 
 impl Run {
+    /// That goes on in the folder of a run that began before.
+    pub fn again(folder: &Path, inputs: Vec<Input>) -> Result<Run> {
+        let folder = RunFolder::open(folder)?;
+        Ok(Run { folder, start: Instant::now(), inputs, interrupted: watch_interrupt() })
+    }
+
     /// Whether Ctrl-C was pressed.
     pub fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
@@ -104,18 +116,48 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         inputs.push(Input::read(&path)?);
     }
     keep_recording(&mut source, &folder, &mut inputs)?;
-    folder.write("problem.lock.toml", source.scene.lock())?;
+    let lock = source.scene.lock();
+    folder.write("problem.lock.toml", &lock)?;
+    let checkpoints = match source.scene.task {
+        Task::Fit => Some(Checkpoints::create(&folder, &Guard::new(&lock, inputs.clone()))?),
+        Task::Forward => None,
+    };
     let run = Run { folder, start, inputs, interrupted: watch_interrupt() };
     run.write_running(&Tally::default())?;
-
     let mut work = Work::default();
-    let outcome = task(&source, &prepared, &run, flags, &mut work);
-    finish(&run, Some(&built.model), &work, outcome, flags)
+    let outcome = task(&source, &prepared, &run, flags, (checkpoints.as_ref(), None), &mut work);
+    let ending = finish(&run, Some(&built.model), &work, outcome, flags)?;
+    if ending == Ending::Interrupted && checkpoints.is_some() {
+        tell(&format!("go on with: risorius resume {}\n", run.folder.path().display()));
+    }
+    Ok(ending)
 }
 
-fn task(source: &Source, prepared: &Prepared, run: &Run, flags: &Flags, work: &mut Work) -> Result<Tally> {
-    match (&prepared.clip, &source.scene.fit) {
-        (Some(clip), Some(spec)) => fit::fit(&source.scene, spec, prepared, clip, run, flags, work),
+/// Goes on with a fit that was interrupted.
+pub(super) fn go_on(
+    source: &Source,
+    prepared: &Prepared,
+    run: Run,
+    flags: &Flags,
+    (checkpoints, left): (Checkpoints, Left),
+) -> Result<Ending> {
+    let mut work = Work::default();
+    let outcome = task(source, prepared, &run, flags, (Some(&checkpoints), Some(left)), &mut work);
+    finish(&run, Some(&prepared.built.model), &work, outcome, flags)
+}
+
+fn task(
+    source: &Source,
+    prepared: &Prepared,
+    run: &Run,
+    flags: &Flags,
+    (checkpoints, left): (Option<&Checkpoints>, Option<Left>),
+    work: &mut Work,
+) -> Result<Tally> {
+    match (&prepared.clip, &source.scene.fit, checkpoints) {
+        (Some(clip), Some(spec), Some(checkpoints)) => {
+            fit::fit(&source.scene, spec, prepared, clip, (run, flags), (checkpoints, left), work)
+        }
         _ => forward::forward(&source.scene, prepared, run, flags, work),
     }
 }
@@ -217,6 +259,8 @@ fn input_files(source: &Source) -> Vec<PathBuf> {
         GeometrySpec::Face(face) => face.landmarks.clone(),
         GeometrySpec::Block(_) | GeometrySpec::Blocks(_) | GeometrySpec::FaceMuscle(_) => None,
     });
+    let expected = scene.fit.iter().filter(|_| scene.task == Task::Fit).flat_map(|fit| &fit.objectives.priors);
+    let curves = curves.chain(expected.map(|prior| prior.csv.clone()));
     let mut files: Vec<PathBuf> = curves.chain(meshes).chain(markers.map(|f| f.markers.clone())).collect();
     files.sort();
     files.dedup();

@@ -750,6 +750,36 @@ pub enum Error {
         /// Its time, s.
         time_s: f64,
     },
+    /// A run that left nothing to go on from.
+    #[error("{}: there is nothing to go on from: {reason}", path.display())]
+    NothingToResume {
+        /// The folder of the run.
+        path: PathBuf,
+        /// What is missing.
+        reason: Box<str>,
+    },
+    /// What a run is of is not as it was when it began.
+    #[error("{}: the problem changed since the run began: {changes}", path.display())]
+    ProblemChanged {
+        /// The folder of the run.
+        path: PathBuf,
+        /// What changed.
+        changes: Box<str>,
+    },
+    /// A checkpoint that cannot be used.
+    #[error("the checkpoint {} cannot be used: {reason}", path.display())]
+    BadCheckpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// Advice on markers was asked for where none are fitted.
+    #[error("{}: this is no fit: there are no markers to add to", path.display())]
+    NotAFit {
+        /// The problem.
+        path: PathBuf,
+    },
     /// A frame shows too few markers to say where the head is.
     #[error(
         "frame {frame} at {time_s:.3} s shows {markers} markers: where the head is takes three that do not lie on a line"
@@ -915,10 +945,14 @@ impl Error {
             Error::StepNotSolved { .. } => "F001",
             Error::Axes { .. } => "M014",
             Error::NoAxes { .. } => "K005",
-            Error::FibreSystem { .. } => "F005",
+            Error::FibreSystem { .. } => "F010",
             Error::FitNotConverged { .. } => "F002",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
+            Error::NotAFit { .. } => "C024",
+            Error::NothingToResume { .. } => "C025",
+            Error::ProblemChanged { .. } => "C026",
+            Error::BadCheckpoint { .. } => "C027",
             Error::HeadNotSeen { .. } => "F020",
             Error::Io { .. } => "O001",
             Error::FolderNotEmpty { .. } => "O002",
@@ -930,6 +964,11 @@ impl Error {
             Error::DamagedRun { .. } => "O005",
             Error::NoSuchShape { .. } => "O006",
         }
+    }
+
+    /// Whether no equilibrium was found: a step that asked for it may have been too long.
+    pub fn is_not_converged(&self) -> bool {
+        matches!(self, Error::NotConverged { .. } | Error::GapNotClosed { .. } | Error::Singular { .. })
     }
 
     /// The place in a text that caused it, where there is one.

@@ -151,6 +151,14 @@ impl Error {
                 "check the units of [[fibres.data]] and the place of the mesh; outside = { project_mm = .. } uses axes near it"
                     .into(),
             ),
+            Error::NothingToResume { .. } => Some("only fits leave checkpoints; begin anew with: risorius run".into()),
+            Error::ProblemChanged { .. } => Some(
+                "frames of two problems do not belong together: put back what changed, or begin anew with: risorius run".into(),
+            ),
+            Error::BadCheckpoint { .. } => Some("begin anew with: risorius run".into()),
+            Error::NotAFit { .. } => {
+                Some("give it a problem with kind = \"fit\" in [task], or the folder that such a problem's run left".into())
+            }
             Error::Optimiser { .. } | Error::NotFinite | Error::FibreSystem { .. } => None,
             Error::InaccurateSolve { .. } => {
                 Some("the body is at a limit point or held too little: check the supports and the path".into())

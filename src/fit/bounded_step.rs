@@ -3,6 +3,7 @@
 //!   minimise 1/2 d^T H d + g^T d,   lower <= d <= upper
 
 use crate::error::{Error, Result};
+use crate::math::block_tridiagonal::BlockTridiagonal;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
 use nalgebra::{DMatrix, DVector};
@@ -13,16 +14,55 @@ use nalgebra::{DMatrix, DVector};
 /// [`Error::StepNotSolved`] with Clarabel's status by name unless that is Solved.
 pub fn bounded_step(h: &DMatrix<f64>, g: &[f64], lower: &[f64], upper: &[f64]) -> Result<Vec<f64>> {
     let n = g.len();
+    let largest = (0..n).map(|i| h[(i, i)]).fold(0.0, f64::max);
+    let column = |j: usize| (0..=j).map(|i| (i, h[(i, j)])).collect();
+    program(largest, column, |fixed| on_active_set(h, g, fixed), g, lower, upper)
+}
+
+/// The same for a chain of blocks.
+///
+/// # Errors
+/// As [`bounded_step`].
+pub fn bounded_step_in_chain(h: &BlockTridiagonal, g: &[f64], lower: &[f64], upper: &[f64]) -> Result<Vec<f64>> {
+    let starts = &h.starts();
+    let column = |j: usize| {
+        let block = starts.partition_point(|start| *start <= j) - 1;
+        let at = j - starts[block];
+        let above =
+            block.checked_sub(1).map(|k| (0..h.next[k].nrows()).map(move |i| (starts[k] + i, h.next[k][(i, at)])));
+        let own = (0..=at).map(|i| (starts[block] + i, h.diagonal[block][(i, at)]));
+        above.into_iter().flatten().chain(own).collect()
+    };
+    let exact = |fixed: &[Option<f64>]| {
+        let free: Vec<bool> = fixed.iter().map(Option::is_none).collect();
+        let held: Vec<f64> = fixed.iter().map(|f| f.unwrap_or(0.0)).collect();
+        let right: Vec<f64> = h.times(&held).iter().zip(g).map(|(h, g)| -g - h).collect();
+        let found = h.solve(&free, &right)?;
+        Some(found.iter().zip(fixed).map(|(found, fixed)| fixed.unwrap_or(*found)).collect())
+    };
+    program(h.largest(), column, exact, g, lower, upper)
+}
+
+/// `column` gives the entries of a column down to the diagonal, `exact` the minimiser with some entries fixed.
+fn program(
+    largest: f64,
+    column: impl Fn(usize) -> Vec<(usize, f64)>,
+    exact: impl Fn(&[Option<f64>]) -> Option<Vec<f64>>,
+    g: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+) -> Result<Vec<f64>> {
+    let n = g.len();
     if n == 0 {
         return Ok(Vec::new());
     }
     // Clarabel's tolerances are absolute: bring the problem to unit size
-    let scale = (0..n).map(|i| h[(i, i)]).fold(0.0, f64::max).max(f64::MIN_POSITIVE);
+    let scale = largest.max(f64::MIN_POSITIVE);
     let (mut columns, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
     for j in 0..n {
-        for i in 0..=j {
+        for (i, value) in column(j) {
             rows.push(i);
-            values.push(h[(i, j)] / scale);
+            values.push(value / scale);
         }
         columns.push(rows.len());
     }
@@ -58,7 +98,7 @@ pub fn bounded_step(h: &DMatrix<f64>, g: &[f64], lower: &[f64], upper: &[f64]) -
     let fixed: Vec<Option<f64>> =
         (0..n).map(|i| if active(i) { Some(upper[i]) } else { active(n + i).then_some(lower[i]) }).collect();
     let inside = |d: &[f64]| d.iter().zip(lower).zip(upper).all(|((d, l), u)| (l..=u).contains(&d));
-    match on_active_set(h, g, &fixed) {
+    match exact(&fixed) {
         Some(exact) if inside(&exact) => Ok(exact),
         // a degenerate active set: what Clarabel found, which is inside to its tolerance
         _ => Ok(x.iter().zip(lower).zip(upper).map(|((d, l), u)| d.clamp(*l, *u)).collect()),

@@ -1,6 +1,6 @@
-//! How far fitted controls can be believed: the covariance from J^T J on the controls that are free.
+//! How far fitted controls can be believed: the covariance from their information on the controls that are free.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, Dyn, SymmetricEigen};
 
 /// Where a fitted control lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,49 +16,66 @@ pub enum Bound {
 /// Directions with less than this part of the largest information are not determined by the markers.
 const UNSEEN: f64 = 1e-12;
 
-/// Standard deviations of the controls for weighted residuals of unit variance: sqrt diag (J_f^T J_f)^-1 on the free set.
-///
-/// `j` holds d(weighted residual)/d(control), one column per control. `None` for a control on a bound, where the model
-/// of a normal error does not hold, and for one that the markers do not determine.
-pub fn standard_deviations(j: &DMatrix<f64>, bounds: &[Bound]) -> Vec<Option<f64>> {
+/// Standard deviations of the controls, sqrt diag (A_ff)^-1 on the free set, from their information A (J^T J of weighted
+/// residuals of unit variance, and what else is known). `None` for a control on a bound, where the model of a normal error does
+/// not hold, and for one that is not determined.
+pub fn standard_deviations(information: &DMatrix<f64>, bounds: &[Bound]) -> Vec<Option<f64>> {
     let mut all = vec![None; bounds.len()];
     let free: Vec<usize> = (0..bounds.len()).filter(|k| bounds[*k] == Bound::Free).collect();
-    if free.is_empty() {
-        return all;
-    }
-    // scaled to unit diagonal, so that "unseen" does not depend on the units of the controls
-    let j = j.select_columns(&free);
-    let sizes: Vec<f64> = j.column_iter().map(|c| c.norm()).collect();
-    if sizes.contains(&0.0) {
-        return remove_unseen(&j, &sizes, &free, all);
-    }
-    let information = j.tr_mul(&j);
-    let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| information[(a, b)] / (sizes[a] * sizes[b]));
-    let eigen = SymmetricEigen::new(scaled);
-    let largest = eigen.eigenvalues.max();
-    for (a, k) in free.iter().enumerate() {
-        let mut variance = 0.0;
-        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > UNSEEN * largest {
-                variance += vector[a] * vector[a] / value;
-            } else if vector[a].abs() > 1e-6 {
-                variance = f64::INFINITY;
-            }
-        }
-        let sd = variance.sqrt() / sizes[a];
-        all[*k] = sd.is_finite().then_some(sd);
+    let inverse = SymmetricInverse::new(&information.select_rows(&free).select_columns(&free));
+    for (at, k) in free.iter().enumerate() {
+        all[*k] = inverse.variance(at).map(f64::sqrt);
     }
     all
 }
 
-/// The standard deviations of the controls that some marker sees.
-fn remove_unseen(j: &DMatrix<f64>, sizes: &[f64], free: &[usize], mut all: Vec<Option<f64>>) -> Vec<Option<f64>> {
-    let seen: Vec<usize> = (0..free.len()).filter(|a| sizes[*a] > 0.0).collect();
-    let found = standard_deviations(&j.select_columns(&seen), &vec![Bound::Free; seen.len()]);
-    for (a, sd) in seen.iter().zip(found) {
-        all[free[*a]] = sd;
+/// The inverse of a positive semidefinite matrix on the directions that it sees. They are told apart with the diagonal scaled
+/// to one, so that it does not depend on units.
+pub struct SymmetricInverse {
+    eigen: Option<SymmetricEigen<f64, Dyn>>,
+    sizes: Vec<f64>,
+}
+
+impl SymmetricInverse {
+    /// Of a symmetric matrix.
+    pub fn new(m: &DMatrix<f64>) -> SymmetricInverse {
+        let sizes: Vec<f64> = m.diagonal().iter().map(|d| d.max(0.0).sqrt()).collect();
+        let part = |a: usize| if sizes[a] > 0.0 { 1.0 / sizes[a] } else { 0.0 };
+        let scaled = DMatrix::from_fn(m.nrows(), m.nrows(), |a, b| m[(a, b)] * part(a) * part(b));
+        // what is not finite is not seen
+        let eigen = (m.nrows() > 0 && scaled.iter().all(|x| x.is_finite())).then(|| SymmetricEigen::new(scaled));
+        SymmetricInverse { eigen, sizes }
     }
-    all
+
+    /// Entry k, k of the inverse; `None` where a direction that is not seen has a part of k.
+    pub fn variance(&self, k: usize) -> Option<f64> {
+        let eigen = self.eigen.as_ref()?;
+        let largest = eigen.eigenvalues.max();
+        let mut variance = 0.0;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > UNSEEN * largest {
+                variance += vector[k] * vector[k] / value;
+            } else if vector[k].abs() > 1e-6 {
+                return None;
+            }
+        }
+        let variance = variance / (self.sizes[k] * self.sizes[k]);
+        variance.is_finite().then_some(variance)
+    }
+
+    /// v^T M^-1 v on the directions that are seen.
+    pub fn square(&self, v: &[f64]) -> f64 {
+        let Some(eigen) = &self.eigen else { return 0.0 };
+        let largest = eigen.eigenvalues.max();
+        let part = |a: usize| if self.sizes[a] > 0.0 { v[a] / self.sizes[a] } else { 0.0 };
+        eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+            .filter(|(value, _)| **value > UNSEEN * largest)
+            .map(|(value, vector)| (0..v.len()).map(|a| vector[a] * part(a)).sum::<f64>().powi(2) / value)
+            .sum()
+    }
 }
 
 #[cfg(test)]
@@ -68,7 +85,7 @@ mod tests {
     #[test]
     fn agrees_with_the_inverse_on_the_free_set() {
         let j = DMatrix::from_row_slice(4, 3, &[1.0, 0.2, 5.0, 0.0, 2.0, 1.0, 1.0, 1.0, 0.0, 0.3, 0.1, 2.0]);
-        let sd = standard_deviations(&j, &[Bound::Free, Bound::Free, Bound::Upper]);
+        let sd = standard_deviations(&j.tr_mul(&j), &[Bound::Free, Bound::Free, Bound::Upper]);
         let part = j.columns(0, 2).into_owned();
         let inverse = part.tr_mul(&part).try_inverse().expect("regular");
         assert!((sd[0].expect("free") - inverse[(0, 0)].sqrt()).abs() < 1e-12);
@@ -79,9 +96,9 @@ mod tests {
     #[test]
     fn what_no_marker_sees_has_no_deviation() {
         let j = DMatrix::from_row_slice(3, 3, &[1.0, 1.0, 0.0, 2.0, 2.0, 0.0, 0.5, 0.5, 0.0]);
-        assert_eq!(standard_deviations(&j, &[Bound::Free; 3]), vec![None; 3]);
+        assert_eq!(standard_deviations(&j.tr_mul(&j), &[Bound::Free; 3]), vec![None; 3]);
         let j = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 2.0, 0.0]);
-        let sd = standard_deviations(&j, &[Bound::Free; 2]);
+        let sd = standard_deviations(&j.tr_mul(&j), &[Bound::Free; 2]);
         assert!((sd[0].expect("seen") - 1.0 / 5.0_f64.sqrt()).abs() < 1e-14);
         assert_eq!(sd[1], None);
     }

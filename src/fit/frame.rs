@@ -1,11 +1,14 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
 use super::free_head;
+use super::gauss_newton::LeastSquares;
+use super::objective::{Instant, Objectives, Past, Sum};
 use super::placement::Marker;
-use super::sensitivity::{Reuse, Sensitivity, sensitivities};
+use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Solver};
 use crate::math::motion::Motion;
+use crate::mesh::MaterialPoint;
 use argmin::core::{Jacobian, Operator};
 use nalgebra::DMatrix;
 use std::cell::RefCell;
@@ -30,9 +33,68 @@ pub struct FrameProblem<'f, 'm> {
     sensitivity: Sensitivity,
     reuse: Reuse,
     drive: Drive,
+    aims: Aims<'f>,
     /// Whether the head moves as it fits best.
     free_head: bool,
     inner: RefCell<Inner<'f, 'm>>,
+}
+
+/// What a frame minimises.
+#[derive(Clone, Copy)]
+pub struct Aims<'f> {
+    /// All parts.
+    pub objectives: &'f Objectives,
+    /// Time of the frame, s.
+    pub time_s: f64,
+    /// Frames before it, the last one first.
+    pub before: &'f [Past],
+}
+
+impl Aims<'_> {
+    /// All but the markers, by the controls in parts of their ranges.
+    pub fn rest(&self, q: &[f64]) -> Sum {
+        let a = self.objectives.parts_of(q);
+        self.objectives.rest(&Instant { time_s: self.time_s, a: &a, before: self.before })
+    }
+
+    /// Name and value of every part; the markers first.
+    pub fn values(&self, q: &[f64], residuals: &[f64]) -> Vec<(String, f64)> {
+        let a = self.objectives.parts_of(q);
+        let rest = self.objectives.values(&Instant { time_s: self.time_s, a: &a, before: self.before });
+        let all = std::iter::once(("markers", self.objectives.loss.cost(residuals))).chain(rest);
+        all.map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+
+    /// The second derivative of all but the markers, by the controls in their units.
+    pub fn prior(&self, q: &[f64]) -> DMatrix<f64> {
+        let sizes: Vec<f64> = self.objectives.sizes().collect();
+        let hessian = self.rest(q).hessian;
+        DMatrix::from_fn(q.len(), q.len(), |a, b| hessian[(a, b)] / (sizes[a] * sizes[b]))
+    }
+}
+
+impl LeastSquares for Aims<'_> {
+    fn cost(&self, q: &[f64], residuals: &[f64]) -> f64 {
+        self.objectives.loss.cost(residuals) + self.rest(q).value
+    }
+
+    fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        let (mut g, mut h) = self.objectives.loss.model(residuals, j);
+        let rest = self.rest(q);
+        g.iter_mut().zip(rest.gradient.iter().zip(self.objectives.sizes())).for_each(|(g, (r, size))| *g += r / size);
+        h += self.prior(q);
+        (g, h)
+    }
+}
+
+impl LeastSquares for FrameProblem<'_, '_> {
+    fn cost(&self, q: &[f64], residuals: &[f64]) -> f64 {
+        self.aims.cost(q, residuals)
+    }
+
+    fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+        self.aims.model(q, residuals, j)
+    }
 }
 
 struct Inner<'f, 'm> {
@@ -50,9 +112,10 @@ struct Inner<'f, 'm> {
 /// dx/dq for the unknowns, one direction each.
 #[derive(Debug, Clone)]
 pub struct Directions {
-    columns: Vec<Vec<f64>>,
+    /// One direction in the unknowns of the balance per control.
+    pub columns: Vec<Vec<f64>>,
     /// Whether they were found at the equilibrium where they are used, and not kept from another.
-    fresh: bool,
+    pub fresh: bool,
 }
 
 impl Directions {
@@ -82,12 +145,12 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         measured: Vec<Measured>,
         unknowns: &'f [usize],
         (sensitivity, reuse): (Sensitivity, Reuse),
-        drive: Drive,
+        (drive, aims): (Drive, Aims<'f>),
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
         let inner = RefCell::new(Inner { solver, base: start, directions, trial: None, held_head: None });
-        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, free_head: false, inner }
+        FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, free_head: false, inner }
     }
 
     /// With a head that moves as it fits best.
@@ -111,6 +174,15 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
     pub fn into_equilibrium(self) -> (Equilibrium, Option<Directions>) {
         let inner = self.inner.into_inner();
         (inner.base, inner.directions)
+    }
+
+    /// The equilibrium last found, whether or not the derivative was asked for there, and the sensitivities if it was.
+    pub fn into_found(self) -> (Equilibrium, Option<Directions>) {
+        let Inner { base, directions, trial, .. } = self.inner.into_inner();
+        match trial {
+            Some(trial) => (trial, None),
+            None => (base, directions),
+        }
     }
 
     /// The controls of the model for values of the unknowns.
@@ -204,16 +276,12 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
                 fresh: true,
             },
         };
+        let points: Vec<MaterialPoint> = self.measured.iter().map(|m| self.markers[m.marker].point).collect();
         let model = inner.solver.model();
+        let rates = rates_at(model, &inner.base.state, self.unknowns, &directions.columns, &points);
         let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
-        for (column, (control, direction)) in self.unknowns.iter().zip(&directions.columns).enumerate() {
-            let du = model.displacement_rate(&inner.base.state, *control, direction);
-            for (row, m) in self.measured.iter().enumerate() {
-                let change = model.mesh().interpolate(self.markers[m.marker].point, &du);
-                for (i, change) in change.iter().enumerate() {
-                    j[(3 * row + i, column)] = m.weight * change;
-                }
-            }
+        for (row, (m, rate)) in self.measured.iter().zip(&rates).enumerate() {
+            j.rows_mut(3 * row, 3).copy_from(&(rate * m.weight));
         }
         inner.directions = Some(directions);
         if self.free_head {

@@ -1,7 +1,7 @@
 //! Gauss-Newton with bounds and a trust region, as an argmin solver.
 //!
 //! The response to an activation is about even in t = ln(1 + (q - lower) / onset): steps are made in t. With S = dq/dt,
-//! H = S J^T J S and g = S J^T r each iteration solves
+//! H = S H_q S and g = S g_q of the objective's model ([`LeastSquares`]; J^T J and J^T r of plain squares) each iteration solves
 //!   minimise 1/2 d^T H d + g^T d,   bounds of t,   |d_i| <= trust
 //! and takes the step if the true objective falls as the model says, else shrinks the trust region.
 
@@ -36,6 +36,15 @@ impl Range {
     fn at_even(self, t: f64) -> f64 {
         (self.lower + self.onset * t.exp_m1()).clamp(self.lower, self.upper)
     }
+}
+
+/// What is minimised, seen from residuals.
+pub trait LeastSquares {
+    /// The objective at q, where the residuals are these.
+    fn cost(&self, q: &[f64], residuals: &[f64]) -> f64;
+
+    /// Its gradient and a positive semidefinite second derivative by q, where the residuals have the derivative `j`.
+    fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>);
 }
 
 /// The solver.
@@ -79,7 +88,9 @@ impl GaussNewton {
 
 impl<O> Solver<O, GaussNewtonState> for GaussNewton
 where
-    O: Operator<Param = Vec<f64>, Output = Vec<f64>> + Jacobian<Param = Vec<f64>, Jacobian = DMatrix<f64>>,
+    O: LeastSquares
+        + Operator<Param = Vec<f64>, Output = Vec<f64>>
+        + Jacobian<Param = Vec<f64>, Jacobian = DMatrix<f64>>,
 {
     fn name(&self) -> &str {
         "Gauss-Newton with bounds"
@@ -94,7 +105,7 @@ where
         let q: Vec<f64> = q.iter().zip(&self.ranges).map(|(q, r)| q.clamp(r.lower, r.upper)).collect();
         let residuals = residuals(problem, &q)?;
         let jacobian = jacobian(problem, &q)?;
-        let cost = cost(&residuals);
+        let cost = cost(problem, &q, &residuals)?;
         Ok((state.param(q).residuals(residuals).jacobian(jacobian).cost(cost), None))
     }
 
@@ -111,9 +122,9 @@ where
         let n = q.len();
 
         let slopes: Vec<f64> = q.iter().zip(&self.ranges).map(|(q, r)| q - r.lower + r.onset).collect();
-        let scaled = DMatrix::from_fn(j.nrows(), n, |row, k| j[(row, k)] * slopes[k]);
-        let g: DVector<f64> = scaled.tr_mul(&DVector::from_column_slice(&r));
-        let mut h = scaled.tr_mul(&scaled);
+        let (gradient, hessian) = model(problem, &q, &r, &j)?;
+        let g: DVector<f64> = DVector::from_fn(n, |k, _| gradient[k] * slopes[k]);
+        let mut h = DMatrix::from_fn(n, n, |a, b| hessian[(a, b)] * slopes[a] * slopes[b]);
         let still = STILL * h.diagonal().amax();
         for k in 0..n {
             h[(k, k)] += still;
@@ -136,7 +147,7 @@ where
                 // neither rest nor failure is believed before the derivative was taken here
                 let jacobian = jacobian(problem, &q)?;
                 (self.fresh, self.step, self.trust) = (true, f64::INFINITY, self.trust.max(KEPT_TRUST));
-                let gradient = jacobian.tr_mul(&DVector::from_column_slice(&r)).as_slice().to_vec();
+                let gradient = model(problem, &q, &r, &jacobian)?.0;
                 let report = kv!("step" => 0.0; "trust" => self.trust; "rejected" => rejected;);
                 let state = state.param(q).residuals(r).jacobian(jacobian).gradient(gradient).cost(before);
                 return Ok((state, Some(report)));
@@ -144,7 +155,7 @@ where
 
             let outcome = residuals(problem, &trial);
             let after = match &outcome {
-                Ok(residuals) => cost(residuals),
+                Ok(residuals) => cost(problem, &trial, residuals)?,
                 // a step beyond what the forward model can follow is too long, not the end
                 Err(error) if !last && is_not_converged(error) => f64::INFINITY,
                 Err(_) => f64::NAN,
@@ -163,7 +174,7 @@ where
                 let residuals = outcome?;
                 let jacobian = jacobian(problem, &trial)?;
                 self.fresh = !self.keeps;
-                let gradient = jacobian.tr_mul(&DVector::from_column_slice(&residuals)).as_slice().to_vec();
+                let gradient = model(problem, &trial, &residuals, &jacobian)?.0;
                 let report = kv!("step" => self.step; "trust" => self.trust; "rejected" => rejected;);
                 let state = state.param(trial).residuals(residuals).jacobian(jacobian).gradient(gradient).cost(after);
                 return Ok((state, Some(report)));
@@ -202,13 +213,18 @@ where
 }
 
 fn is_not_converged(error: &ArgminError) -> bool {
-    matches!(
-        error.downcast_ref::<Error>(),
-        Some(Error::NotConverged { .. } | Error::GapNotClosed { .. } | Error::Singular { .. })
-    )
+    error.downcast_ref::<Error>().is_some_and(Error::is_not_converged)
 }
 
-/// 1/2 |r|^2
-fn cost(residuals: &[f64]) -> f64 {
-    0.5 * residuals.iter().map(|r| r * r).sum::<f64>()
+fn cost<O: LeastSquares>(problem: &mut Problem<O>, q: &[f64], residuals: &[f64]) -> Result<f64, ArgminError> {
+    problem.problem("cost_evaluations", |p| Ok(p.cost(q, residuals)))
+}
+
+fn model<O: LeastSquares>(
+    problem: &mut Problem<O>,
+    q: &[f64],
+    residuals: &[f64],
+    j: &DMatrix<f64>,
+) -> Result<(Vec<f64>, DMatrix<f64>), ArgminError> {
+    problem.problem("model_evaluations", |p| Ok(p.model(q, residuals, j)))
 }

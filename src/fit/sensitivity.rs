@@ -2,7 +2,9 @@
 
 use crate::error::Result;
 use crate::forward::{Drive, Equilibrium, Settings, Solver};
-use crate::model::Model;
+use crate::mesh::MaterialPoint;
+use crate::model::{Model, State};
+use nalgebra::DMatrix;
 
 /// A way to find sensitivities.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,6 +56,25 @@ pub fn sensitivities(
             found
         }
     }
+}
+
+/// How material points move with the controls `unknowns` at a state: mm per unit of a control, three rows and a column for
+/// each, from the direction that belongs to it.
+pub fn rates_at(
+    model: &Model,
+    state: &State,
+    unknowns: &[usize],
+    directions: &[Vec<f64>],
+    points: &[MaterialPoint],
+) -> Vec<DMatrix<f64>> {
+    let mut rates = vec![DMatrix::zeros(3, unknowns.len()); points.len()];
+    for (column, (control, direction)) in unknowns.iter().zip(directions).enumerate() {
+        let du = model.displacement_rate(state, *control, direction);
+        for (rate, point) in rates.iter_mut().zip(points) {
+            rate.column_mut(column).copy_from_slice(&model.mesh().interpolate(*point, &du));
+        }
+    }
+    rates
 }
 
 /// (x(q + h) - x(q - h)) / 2h, or (4 x(q + h) - x(q + 2h) - 3 x(q)) / 2h where q - h is out of bounds, or its mirror image

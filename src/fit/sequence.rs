@@ -1,86 +1,53 @@
 //! A clip, frame after frame: each fit starts where the last one ended.
 
 use super::covariance::{Bound, standard_deviations};
-use super::frame::{Directions, FrameProblem, Measured};
-use super::free_head::{self, FreeHead};
-use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
+use super::estimate::{Estimate, Memory, Optimum};
+use super::frame::{Aims, Directions, FrameProblem, Measured};
+use super::free_head;
+use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
+use super::identifiability::Evidence;
+use super::objective::{Objectives, Past};
+use super::observed::{Log, own_error};
 use super::placement::{Marker, check_units, place};
-use super::sensitivity::{Reuse, Sensitivity};
+use super::sensitivity::{Reuse, Sensitivity, rates_at};
 use crate::error::{Error, Result};
 use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
 use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
-use crate::model::{Control, Model};
+use crate::mesh::MaterialPoint;
+use crate::model::{Control, Model, State};
 use crate::scene::{ControlValue, Curves, FitSpec, HeadSpec, ReuseSpec, Scene, SensitivitySpec};
-use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, KV, State as _, TerminationReason, TerminationStatus};
+use argmin::core::observers::ObserverMode;
+use argmin::core::{Executor, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
-use std::sync::{Arc, Mutex, PoisonError};
+
+/// Positions of all markers in a frame, mm, and what of them it shows.
+pub(super) type Shown = (Vec<Option<[f64; 3]>>, Vec<Measured>);
 
 /// The fit of a recording.
 pub struct Fit<'m> {
-    solver: Solver<'m>,
-    markers: Vec<Marker>,
+    pub(super) solver: Solver<'m>,
+    pub(super) markers: Vec<Marker>,
     /// Controls that are sought.
-    unknowns: Vec<usize>,
+    pub(super) unknowns: Vec<usize>,
     /// Values of all controls where they are not sought and do not change.
-    held: Vec<f64>,
+    pub(super) held: Vec<f64>,
     /// Controls that follow a table over the time of the recording.
-    held_curves: Vec<HeldCurve>,
-    sensitivity: Sensitivity,
-    reuse: Reuse,
-    tolerance: f64,
-    max_iterations: usize,
+    pub(super) held_curves: Vec<HeldCurve>,
+    pub(super) sensitivity: Sensitivity,
+    pub(super) reuse: Reuse,
+    pub(super) tolerance: f64,
+    pub(super) max_iterations: usize,
+    pub(super) objectives: Objectives,
+    /// Frames that were fitted, the last one first.
+    pub(super) before: Vec<Past>,
     /// Whether every marker has a standard deviation; otherwise the residuals estimate one.
-    known_sd: bool,
+    pub(super) known_sd: bool,
     /// Whether the motion of the head is estimated too.
-    free_head: bool,
+    pub(super) free_head: bool,
     /// The equilibrium of the last frame, and the sensitivities there.
-    last: Equilibrium,
-    directions: Option<Directions>,
-}
-
-/// One iteration of a frame's fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FitIteration {
-    /// 1/2 sum of squared weighted residuals after it.
-    pub cost: f64,
-    /// Largest change of a control, as a part of its range.
-    pub step: f64,
-    /// Trust radius after it.
-    pub trust: f64,
-    /// Steps that were tried and rejected.
-    pub rejected: u64,
-}
-
-/// The answer of a fit for a frame.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    /// Index of the frame in the recording.
-    pub frame: usize,
-    /// Its time, s.
-    pub time_s: f64,
-    /// The equilibrium; all controls are in its state.
-    pub equilibrium: Equilibrium,
-    /// Standard deviation of each control of the model; `None` on a bound, or where it is not sought or not determined.
-    pub sd: Vec<Option<f64>>,
-    /// Where each control of the model lies.
-    pub bounds: Vec<Bound>,
-    /// Model position of every marker, mm.
-    pub positions_mm: Vec<[f64; 3]>,
-    /// Measured position of every marker, mm; `None` where lost.
-    pub measured_mm: Vec<Option<[f64; 3]>>,
-    /// Root mean square distance between model and measured markers, mm.
-    pub rms_mm: f64,
-    /// Largest distance, mm.
-    pub max_mm: f64,
-    /// Gauss-Newton iterations.
-    pub iterations: Vec<FitIteration>,
-    /// d(weighted residual)/d(control) at the equilibrium: three rows for every marker that was measured, a column for every
-    /// control that is sought.
-    pub jacobian: DMatrix<f64>,
-    /// The motion of the head, where it is estimated; measured positions then have it taken out.
-    pub head: Option<FreeHead>,
+    pub(super) last: Equilibrium,
+    pub(super) directions: Option<Directions>,
 }
 
 impl<'m> Fit<'m> {
@@ -94,6 +61,7 @@ impl<'m> Fit<'m> {
         let settings = Settings { release: false, ..settings(scene) };
         let mut solver = Solver::new(model, settings)?;
         let unknowns = sought(fit, model);
+        let objectives = Objectives::new(scene, fit, model, &unknowns)?;
         let mut held = vec![0.0; model.controls().len()];
         let mut held_curves = Vec::new();
         let ranges = scene.control_ranges();
@@ -133,6 +101,8 @@ impl<'m> Fit<'m> {
             },
             tolerance: fit.tolerance,
             max_iterations: fit.max_iterations,
+            objectives,
+            before: Vec::new(),
             last,
             directions: None,
         })
@@ -148,9 +118,41 @@ impl<'m> Fit<'m> {
         &self.unknowns
     }
 
+    /// What the next frame depends on.
+    pub fn memory(&self) -> Memory {
+        Memory {
+            last: self.last.clone(),
+            directions: self.directions.clone(),
+            before: self.before.clone(),
+            tangent: self.solver.tangent_states(),
+        }
+    }
+
+    /// Goes on from there.
+    ///
+    /// # Errors
+    /// Where the tangent cannot be factorised.
+    pub fn restore(&mut self, memory: Memory) -> Result<()> {
+        let Memory { last, directions, before, tangent } = memory;
+        (self.last, self.directions, self.before) = (last, directions, before);
+        self.solver.restore_tangent(tangent.as_ref())
+    }
+
     /// Work done so far.
     pub fn work(&self) -> Work {
         self.solver.work()
+    }
+
+    /// All controls of the model.
+    pub fn controls(&self) -> &'m [Control] {
+        self.solver.model().controls()
+    }
+
+    /// How points of the body move with the controls that are sought, at the state of the frame that was fitted last: mm per
+    /// unit of a control, three rows and a column for each. `None` at any other state.
+    pub fn rates_at(&self, points: &[MaterialPoint], state: &State) -> Option<Vec<DMatrix<f64>>> {
+        let columns = &self.directions.as_ref().filter(|_| self.last.state == *state)?.columns;
+        Some(rates_at(self.solver.model(), state, &self.unknowns, columns, points))
     }
 
     /// Fits one frame, starting from the last one that was fitted.
@@ -159,27 +161,74 @@ impl<'m> Fit<'m> {
     /// A frame without markers, a fit that does not converge, an equilibrium that is not found. The next frame then starts
     /// from the last good one.
     pub fn frame(&mut self, recording: &Recording, frame: usize) -> Result<Estimate> {
+        let (measured_mm, measured) = self.shown(recording, frame)?;
+        let optimum = self.optimise(frame, recording.frames[frame].time_s, measured.clone())?;
+        Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
+    }
+
+    /// The estimate of a frame for controls that are known, one for each that is sought: nothing is searched.
+    ///
+    /// # Errors
+    /// A frame without markers, an equilibrium that is not found.
+    pub fn at(&mut self, recording: &Recording, frame: usize, q: Vec<f64>) -> Result<Estimate> {
+        let (measured_mm, measured) = self.shown(recording, frame)?;
+        let problem = self.problem(recording.frames[frame].time_s, measured.clone());
+        let residuals = problem.apply(&q).map_err(own_error)?;
+        // asked again at the same place it is taken anew, if it was kept from another
+        problem.jacobian(&q).map_err(own_error)?;
+        let jacobian = problem.jacobian(&q).map_err(own_error)?;
+        let held_head = problem.take_held_head();
+        let (equilibrium, directions) = problem.into_equilibrium();
+        let cost = self.objectives.loss.cost(&residuals);
+        let optimum =
+            Optimum { equilibrium, directions, jacobian, held_head, residuals, cost, iterations: Vec::new() };
+        Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
+    }
+
+    /// Positions of all markers in a frame, and of those that it shows with their weights.
+    pub(super) fn measured(&self, recording: &Recording, frame: usize) -> Shown {
         let shown = &recording.frames[frame];
-        let mut measured_mm: Vec<Option<[f64; 3]>> =
-            self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
+        let all: Vec<Option<[f64; 3]>> = self.markers.iter().map(|m| shown.positions_mm[m.column]).collect();
         let weigh = |(marker, position): (usize, &Option<[f64; 3]>)| {
             let weight = 1.0 / self.markers[marker].sd.unwrap_or(1.0);
             position.map(|position| Measured { marker, position, weight })
         };
-        let measured: Vec<Measured> = measured_mm.iter().enumerate().filter_map(weigh).collect();
+        let measured = all.iter().enumerate().filter_map(weigh).collect();
+        (all, measured)
+    }
+
+    /// The same of a frame that must show some.
+    fn shown(&self, recording: &Recording, frame: usize) -> Result<Shown> {
+        let (all, measured) = self.measured(recording, frame);
+        let time_s = recording.frames[frame].time_s;
         if measured.is_empty() {
-            return Err(Error::NoMarkersInFrame { frame, time_s: shown.time_s });
+            return Err(Error::NoMarkersInFrame { frame, time_s });
         }
         if self.free_head {
             let mesh = self.solver.model().mesh();
             let rest: Vec<[f64; 3]> = measured.iter().map(|m| mesh.position(self.markers[m.marker].point)).collect();
             if free_head::nearest(&rest, &measured).is_none() {
-                return Err(Error::HeadNotSeen { frame, time_s: shown.time_s, markers: measured.len() });
+                return Err(Error::HeadNotSeen { frame, time_s, markers: measured.len() });
             }
         }
-        let residuals = (3 * measured.len()).saturating_sub(if self.free_head { 6 } else { 0 });
-        let optimum = self.optimise(frame, shown.time_s, measured.clone())?;
-        let (bounds, sd, variance) = self.uncertainty(&optimum, residuals);
+        Ok((all, measured))
+    }
+
+    /// What is known at the end of a frame, which the next one starts from.
+    pub(super) fn estimate(
+        &mut self,
+        recording: &Recording,
+        frame: usize,
+        (mut measured_mm, measured): Shown,
+        optimum: Optimum,
+    ) -> Estimate {
+        let time_s = recording.frames[frame].time_s;
+        let q: Vec<f64> = self.unknowns.iter().map(|k| optimum.equilibrium.state.controls[*k]).collect();
+        let aims = Aims { objectives: &self.objectives, time_s, before: &self.before };
+        let (gradient, _) = aims.model(&q, &optimum.residuals, &optimum.jacobian);
+        let information = self.objectives.loss.model(&optimum.residuals, &optimum.jacobian).1;
+        let (prior, costs) = (aims.prior(&q), aims.values(&q, &optimum.residuals));
+        let (bounds, sd, variance) = self.uncertainty(&optimum, &(&information + &prior));
         (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
@@ -195,26 +244,52 @@ impl<'m> Fit<'m> {
         });
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
-        Ok(Estimate {
+        let estimate = Estimate {
             frame,
-            time_s: recording.frames[frame].time_s,
+            time_s,
             equilibrium: self.last.clone(),
             sd,
             bounds,
-            rms_mm: (distances.iter().map(|d| d * d).sum::<f64>() / distances.len() as f64).sqrt(),
+            rms_mm: (distances.iter().map(|d| d * d).sum::<f64>() / distances.len().max(1) as f64).sqrt(),
             max_mm: distances.iter().copied().fold(0.0, f64::max),
             positions_mm,
             measured_mm,
             iterations: optimum.iterations,
+            information,
+            prior,
+            gradient,
+            weights: self.objectives.loss.weights(&optimum.residuals),
+            costs,
             jacobian: optimum.jacobian,
+            residuals: optimum.residuals,
+            variance,
+            bridged: false,
             head,
-        })
+        };
+        self.remember(&estimate);
+        estimate
+    }
+
+    /// A frame as a least-squares problem that starts where the last frame ended.
+    fn problem(&mut self, time_s: f64, measured: Vec<Measured>) -> FrameProblem<'_, 'm> {
+        let aims = Aims { objectives: &self.objectives, time_s, before: &self.before };
+        let drive = Drive { controls: held_at(&self.held, &self.held_curves, time_s), load: 1.0 };
+        FrameProblem::new(
+            &mut self.solver,
+            &self.markers,
+            measured,
+            &self.unknowns,
+            (self.sensitivity, self.reuse),
+            (drive, aims),
+            self.last.clone(),
+            self.directions.clone(),
+        )
+        .with_free_head(self.free_head)
     }
 
     /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
     fn optimise(&mut self, frame: usize, time_s: f64, measured: Vec<Measured>) -> Result<Optimum> {
         let model = self.solver.model();
-        let held = held_at(&self.held, &self.held_curves, time_s);
         let range = |k: &usize| {
             let control = &model.controls()[*k];
             Range { lower: control.lower, upper: control.upper, onset: control.onset }
@@ -222,21 +297,11 @@ impl<'m> Fit<'m> {
         let ranges = self.unknowns.iter().map(range).collect();
         let start: Vec<f64> = self.unknowns.iter().map(|k| self.last.state.controls[*k]).collect();
         let log = Log::default();
-        let problem = FrameProblem::new(
-            &mut self.solver,
-            &self.markers,
-            measured,
-            &self.unknowns,
-            (self.sensitivity, self.reuse),
-            Drive { controls: held, load: 1.0 },
-            self.last.clone(),
-            self.directions.clone(),
-        )
-        .with_free_head(self.free_head);
+        let (tolerance, reuse) = (self.tolerance, self.reuse);
         let most = self.max_iterations as u64;
-        let solver = GaussNewton::new(ranges, self.tolerance);
-        let solver = if self.reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
-        let mut result = Executor::new(problem, solver)
+        let solver = GaussNewton::new(ranges, tolerance);
+        let solver = if reuse == Reuse::Fresh { solver } else { solver.with_kept_jacobians() };
+        let mut result = Executor::new(self.problem(time_s, measured), solver)
             .configure(|state: GaussNewtonState| state.param(start).max_iters(most))
             .add_observer(log.clone(), ObserverMode::Always)
             .timer(false)
@@ -251,26 +316,45 @@ impl<'m> Fit<'m> {
             TerminationStatus::Terminated(TerminationReason::MaxItersReached) => Some("the iterations were used up"),
             TerminationStatus::Terminated(_) | TerminationStatus::NotTerminated => Some("it was ended from outside"),
         };
-        match (reason, result.problem.take_problem(), result.state.take_jacobian()) {
-            (None, Some(problem), Some(jacobian)) => {
+        let residuals = result.state.take_residuals();
+        match (reason, result.problem.take_problem(), result.state.take_jacobian().zip(residuals)) {
+            (None, Some(problem), Some((jacobian, residuals))) => {
                 let held_head = problem.take_held_head();
                 let (equilibrium, directions) = problem.into_equilibrium();
-                let cost = result.state.get_cost();
-                Ok(Optimum { equilibrium, directions, jacobian, held_head, cost, iterations })
+                let cost = 0.5 * residuals.iter().map(|r| r * r).sum::<f64>();
+                Ok(Optimum { equilibrium, directions, jacobian, held_head, residuals, cost, iterations })
             }
             (reason, ..) => Err(Error::FitNotConverged {
                 frame,
                 iterations: iterations.len(),
                 reason: reason.unwrap_or("the optimiser lost its state"),
                 step: iterations.last().map_or(f64::INFINITY, |i| i.step),
-                required: self.tolerance,
+                required: tolerance,
             }),
         }
     }
 
-    /// Where the controls lie, their standard deviations, and the variance of a weighted residual: with the given deviations of
-    /// the markers, or with what the `residuals` of the frame estimate where not all are given.
-    fn uncertainty(&self, optimum: &Optimum, residuals: usize) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
+    /// Keeps what the next frames expect. A control on a bound is as uncertain as its one-sided interval says.
+    fn remember(&mut self, estimate: &Estimate) {
+        let Some(evidence) = Evidence::of(estimate, self.controls(), &self.unknowns) else { return };
+        if self.objectives.smoothness.is_none() {
+            return;
+        }
+        let covariance = evidence.covariance();
+        self.before
+            .insert(0, Past { time_s: estimate.time_s, a: self.objectives.parts_of(&evidence.values), covariance });
+        self.before.truncate(Past::KEPT);
+    }
+
+    /// What is minimised, in a line.
+    pub fn words(&self) -> String {
+        self.objectives.words()
+    }
+
+    /// Where the controls lie, their standard deviations and the variance of a weighted residual: with the given deviations
+    /// of the markers, or with what the residuals of the frame estimate where not all are given. `whole` is the information of the frame.
+    #[allow(clippy::type_complexity)] // three things that belong together
+    fn uncertainty(&self, optimum: &Optimum, whole: &DMatrix<f64>) -> (Vec<Bound>, Vec<Option<f64>>, Option<f64>) {
         let values = optimum.equilibrium.state.controls.iter();
         let bound = |(value, control): (&f64, &Control)| match value {
             value if *value <= control.lower => Bound::Lower,
@@ -280,41 +364,30 @@ impl<'m> Fit<'m> {
         let bounds: Vec<Bound> = values.zip(self.solver.model().controls()).map(bound).collect();
         let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
         let free = sought.iter().filter(|b| **b == Bound::Free).count();
+        // where the head is estimated it takes six of them
+        let residuals = optimum.residuals.len().saturating_sub(if self.free_head { 6 } else { 0 });
         let variance = if self.known_sd {
             Some(1.0)
         } else {
             (residuals > free).then(|| 2.0 * optimum.cost / (residuals - free) as f64)
         };
         let mut sd = vec![None; bounds.len()];
-        for (k, unit) in self.unknowns.iter().zip(standard_deviations(&optimum.jacobian, &sought)) {
+        for (k, unit) in self.unknowns.iter().zip(standard_deviations(whole, &sought)) {
             sd[*k] = unit.zip(variance).map(|(unit, variance)| unit * variance.sqrt());
         }
         (bounds, sd, variance)
     }
 }
 
-/// Where the iteration of a frame ended.
-struct Optimum {
-    equilibrium: Equilibrium,
-    directions: Option<Directions>,
-    /// d(weighted residual)/d(unknown control).
-    jacobian: DMatrix<f64>,
-    /// The same with the head held, where that is free.
-    held_head: Option<DMatrix<f64>>,
-    /// 1/2 sum of squared weighted residuals.
-    cost: f64,
-    iterations: Vec<FitIteration>,
-}
-
 /// Controls of one name that are not sought and follow a table.
-struct HeldCurve {
+pub(super) struct HeldCurve {
     controls: Vec<usize>,
     name: String,
     curves: Curves,
 }
 
 /// The controls that are not sought, at a time in seconds; those that are, are 0.
-fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
+pub(super) fn held_at(held: &[f64], curves: &[HeldCurve], time_s: f64) -> Vec<f64> {
     let mut held = held.to_vec();
     for HeldCurve { controls, name, curves } in curves {
         if let Some(value) = curves.at(name, time_s) {
@@ -339,31 +412,5 @@ pub fn settings(scene: &Scene) -> Settings {
         step_min: s.step_min,
         precision: s.precision,
         ..Settings::default()
-    }
-}
-
-/// argmin wraps errors; ours come out again as they went in.
-fn own_error(error: argmin::core::Error) -> Error {
-    error.downcast::<Error>().unwrap_or_else(|other| Error::Optimiser { message: other.to_string() })
-}
-
-/// An argmin observer that keeps what each iteration did.
-#[derive(Clone, Default)]
-struct Log(Arc<Mutex<Vec<FitIteration>>>);
-
-impl Log {
-    fn take(&self) -> Vec<FitIteration> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-impl Observe<GaussNewtonState> for Log {
-    fn observe_iter(&mut self, state: &GaussNewtonState, kv: &KV) -> std::result::Result<(), argmin::core::Error> {
-        let number = |key: &str| kv.get(key).and_then(|v| v.get_float()).unwrap_or(f64::NAN);
-        let rejected = kv.get("rejected").and_then(|v| v.get_uint()).unwrap_or(0);
-        let iteration =
-            FitIteration { cost: state.get_cost(), step: number("step"), trust: number("trust"), rejected };
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(iteration);
-        Ok(())
     }
 }

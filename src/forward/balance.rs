@@ -33,6 +33,9 @@ pub(super) struct Balance<'m> {
     tangent: Tangent,
     factor: Factor,
     factored: bool,
+    /// Where the tangent was assembled last, and where the one that is factorised was.
+    assembled_at: Option<State>,
+    factored_at: Option<State>,
     /// What factors with other patterns have done.
     earlier: factor::Work,
     target: Drive,
@@ -88,6 +91,8 @@ impl<'m> Balance<'m> {
             tangent: model.tangent(),
             factor: Factor::new(model.symbolic().clone(), precision)?,
             factored: false,
+            assembled_at: None,
+            factored_at: None,
             earlier: factor::Work::default(),
             target: Drive { controls: vec![0.0; model.controls().len()], load: 0.0 },
             prescribed: Vec::new(),
@@ -209,15 +214,33 @@ impl<'m> Balance<'m> {
     /// Factorises the tangent at a state, to see its negative modes.
     pub fn inspect(&mut self, state: &State) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);
-        self.assemble();
+        self.assemble(state);
         self.refactor()
+    }
+
+    /// The states at which the tangent at hand was factorised and assembled: what the next solves depend on beside their own
+    /// input. `None` where nothing is factorised, or under a drag.
+    pub fn tangent_states(&self) -> Option<[State; 2]> {
+        let held = self.drag.is_some() || !self.factored;
+        (!held).then(|| Some([self.factored_at.clone()?, self.assembled_at.clone()?]))?
+    }
+
+    /// Makes the tangent anew as [`Balance::tangent_states`] told of it, or forgets the one at hand.
+    pub fn restore_tangent(&mut self, states: Option<&[State; 2]>) -> Result<()> {
+        self.factored = false;
+        if let Some([factored, assembled]) = states {
+            self.inspect(factored)?;
+            self.evaluate(assembled, Want::Stiffness, None);
+            self.assemble(assembled);
+        }
+        Ok(())
     }
 
     /// The stiffness of the body at rest without its pressures.
     pub fn stiffness_at_rest(&mut self) -> SymmetricMatrix {
         let model = self.model;
         self.evaluate(&model.rest(), Want::Stiffness, None);
-        self.assemble();
+        self.assemble(&model.rest());
         self.factored = false;
         let mut matrix = self.tangent.matrix.clone();
         let mut kept = vec![true; model.numbering().unknowns()];
@@ -238,7 +261,7 @@ impl<'m> Balance<'m> {
     /// One column of `rhs` for each entry of `moved`: the rate c of the gaps that comes with it, if there is one.
     fn solve_held(&mut self, state: &State, rhs: &mut [f64], moved: Vec<Option<Vec<Vec<f64>>>>) -> Result<()> {
         self.evaluate(state, Want::Stiffness, None);
-        self.assemble();
+        self.assemble(state);
         self.solve_assembled(rhs, moved.len())?;
         if state.multipliers.iter().all(Vec::is_empty) {
             return Ok(());
@@ -328,12 +351,14 @@ impl<'m> Balance<'m> {
         evaluation
     }
 
-    fn assemble(&mut self) {
+    /// The tangent of the last evaluation, which was at `state`.
+    fn assemble(&mut self, state: &State) {
         let start = Instant::now();
         self.model.assemble(&self.workspace, &mut self.tangent);
         if let Some(drag) = &self.drag {
             self.tangent.matrix.add_scaled(drag.strength, &drag.stiffness);
         }
+        self.assembled_at = Some(state.clone());
         self.work.assembly_seconds += seconds_since(start);
     }
 
@@ -344,6 +369,7 @@ impl<'m> Balance<'m> {
             self.factor = Factor::new(self.model.symbolic_of(&self.tangent)?, self.precision)?;
         }
         self.factor.refactor(&self.tangent.matrix)?;
+        self.factored_at.clone_from(&self.assembled_at);
         self.factored = true;
         Ok(())
     }
@@ -401,7 +427,7 @@ impl Equations for Balance<'_> {
     fn step(&mut self, state: &State) -> Result<Direction> {
         let gap = self.outstanding(state);
         let evaluation = self.evaluate(state, Want::Stiffness, gap.as_deref());
-        self.assemble();
+        self.assemble(state);
         self.residual = evaluation.residual;
         self.lifted = gap.as_ref().map(|_| evaluation.lifted);
         self.lifted_gap = gap.clone();

@@ -70,6 +70,19 @@ impl<'m> Estimator<'m> {
         BEYOND_HALVED * values.map(|k| norm(subtract(corrected.u[k], carried.u[k]))).fold(0.0, f64::max)
     }
 
+    /// See [`Solver::tangent_states`].
+    pub fn tangent_states(&self) -> Option<[State; 2]> {
+        self.solver.tangent_states()
+    }
+
+    /// See [`Solver::restore_tangent`].
+    ///
+    /// # Errors
+    /// Where the tangent cannot be factorised.
+    pub fn restore_tangent(&mut self, states: Option<&[State; 2]>) -> Result<()> {
+        self.solver.restore_tangent(states)
+    }
+
     /// The work on the halved elements.
     pub fn work(&self) -> Work {
         self.solver.work()

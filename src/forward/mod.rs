@@ -491,6 +491,20 @@ impl<'m> Solver<'m> {
         Some(most.told(model))
     }
 
+    /// The states at which the tangent at hand was factorised and assembled: what further answers depend on, to the last bit,
+    /// beside what is asked. `None` where there is none.
+    pub fn tangent_states(&self) -> Option<[State; 2]> {
+        self.balance.tangent_states()
+    }
+
+    /// Makes the tangent anew from such states, or forgets the one at hand.
+    ///
+    /// # Errors
+    /// Where it cannot be factorised.
+    pub fn restore_tangent(&mut self, states: Option<&[State; 2]>) -> Result<()> {
+        self.balance.restore_tangent(states)
+    }
+
     /// Solves K x = b with the tangent at the equilibrium `state` for several right-hand sides, one after the other in
     /// `rhs`. The factor of Newton's last iteration is reused and the solution refined against the tangent at `state`.
     ///

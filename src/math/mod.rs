@@ -4,9 +4,11 @@
 //! small contiguous *groups* (one a mesh node, or one an element), and every element couples all of its groups.
 
 pub mod assignment;
+pub mod block_tridiagonal;
 pub mod factor;
 pub mod lanes;
 pub mod motion;
+pub mod normal;
 pub mod ordering;
 pub mod quadrature;
 mod refine;

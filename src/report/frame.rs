@@ -58,6 +58,19 @@ impl MarkerPair<'_> {
     }
 }
 
+/// A marker that a robust loss sets aside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outlier<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its distance from the model, mm.
+    pub distance_mm: f64,
+    /// The same in its standard deviations.
+    pub distance_sds: f64,
+    /// How much it still counts in relation to a marker nearby.
+    pub weight: f64,
+}
+
 /// Estimated errors of the mesh in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshError {

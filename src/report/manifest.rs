@@ -6,7 +6,7 @@ use super::status::write_json;
 use crate::error::Result;
 use crate::forward::Work;
 use crate::model::Model;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub struct Manifest {
 }
 
 /// A file that was read, with what tells it from any other.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
     /// The path as it was used.
     pub path: PathBuf,

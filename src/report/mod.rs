@@ -7,6 +7,7 @@
 //!   report.html                         the same and more for a browser
 //!   tables/*.csv                        numbers; units in the column names, a lost value is an empty cell
 //!   view/result.pvd, muscles.pvd, contact.pvd, markers.pvd, linear/result.pvd      shapes for ParaView
+//!   state/                              checkpoints of a fit: `risorius resume` goes on from them
 //!   view/result_0000.exf, ...           the same shapes for Zinc and cmgui
 //! ```
 //!
@@ -24,6 +25,7 @@ pub mod playback;
 pub mod pvd;
 pub mod record;
 pub mod run_folder;
+pub mod state;
 pub mod status;
 pub mod study;
 pub mod summary;
@@ -32,7 +34,7 @@ pub mod view;
 pub mod vtu;
 
 pub use frame::{
-    BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Probe, ProbeState, bone_states,
+    BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Outlier, Probe, ProbeState, bone_states,
     contact_states, muscle_states, probe_states,
 };
 pub use manifest::{Input, Manifest};

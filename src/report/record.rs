@@ -1,14 +1,17 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
-use super::frame::{Frame, MarkerPair, MeshError, Probe, bone_states, contact_states, muscle_states, probe_states};
+use super::frame::{
+    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_states, muscle_states, probe_states,
+};
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable, MarkerTable,
-    MuscleTable, ProbeTable, write_cost,
+    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, ProbeTable, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
-use crate::fit::sequence::FitIteration;
+use crate::fit::estimate::FitIteration;
+use crate::fit::identifiability::{ClipKnowledge, Told};
 use crate::forward::{Equilibrium, Failure, Work};
 use crate::model::{Model, State};
 use crate::scene::OutputSpec;
@@ -27,7 +30,8 @@ pub struct Record<'a> {
     muscles: Option<MuscleTable>,
     bones: Option<BoneTable>,
     contacts: Option<ContactTable>,
-    fit: Option<(MarkerTable, FitTable)>,
+    fit: Option<(MarkerTable, FitTable, IdentifiabilityTables, ObjectiveTable)>,
+    outliers: Option<OutlierTable>,
     probe_table: Option<ProbeTable>,
     estimates: Option<EstimateTable>,
     view: View,
@@ -60,7 +64,16 @@ impl<'a> Record<'a> {
             muscles: model.muscles().next().map(|_| MuscleTable::create(run)).transpose()?,
             bones: model.bones().first().map(|_| BoneTable::create(run)).transpose()?,
             contacts: model.contacts().next().map(|_| ContactTable::create(run)).transpose()?,
-            fit: if fitted { Some((MarkerTable::create(run)?, FitTable::create(run)?)) } else { None },
+            fit: match fitted {
+                true => Some((
+                    MarkerTable::create(run)?,
+                    FitTable::create(run)?,
+                    IdentifiabilityTables::create(run)?,
+                    ObjectiveTable::create(run)?,
+                )),
+                false => None,
+            },
+            outliers: None,
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
             estimates: None,
             view: View::new(run),
@@ -95,7 +108,7 @@ impl<'a> Record<'a> {
         if let Some(table) = &mut self.contacts {
             table.add(frame, &contact_states(self.model, state))?;
         }
-        if let Some((table, fit)) = &mut self.fit {
+        if let Some((table, fit, ..)) = &mut self.fit {
             table.add(frame, markers)?;
             fit.add(frame, iterations)?;
         }
@@ -108,6 +121,46 @@ impl<'a> Record<'a> {
         self.frames += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Writes what the markers of a frame tell; `names` are those of all controls and of all markers, `biases` one per control
+    /// that was sought or none.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn told(
+        &mut self,
+        frame: Frame,
+        told: &Told,
+        names: (&[String], &[String]),
+        biases: &[Option<f64>],
+    ) -> Result<()> {
+        self.fit.as_mut().map_or(Ok(()), |(_, _, tables, _)| tables.add(frame, told, names, biases))
+    }
+
+    /// Writes what the parts of the objective of a frame cost, and the markers that its loss sets aside.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn objectives(&mut self, frame: Frame, costs: &[(String, f64)], outliers: &[Outlier<'_>]) -> Result<()> {
+        if let Some((.., table)) = &mut self.fit {
+            table.add(frame, costs)?;
+        }
+        if outliers.is_empty() {
+            return Ok(());
+        }
+        if self.outliers.is_none() {
+            self.outliers = Some(OutlierTable::create(self.run)?);
+        }
+        self.outliers.as_mut().map_or(Ok(()), |table| table.add(frame, outliers))
+    }
+
+    /// Writes which combinations of controls the whole clip tells.
+    ///
+    /// # Errors
+    /// Where a file cannot be written.
+    pub fn told_of_clip(&mut self, clip: &ClipKnowledge, controls: &[String]) -> Result<()> {
+        self.fit.as_mut().map_or(Ok(()), |(_, _, tables, _)| tables.clip(&clip.combinations(), controls))
     }
 
     /// Writes the estimated errors of a frame.

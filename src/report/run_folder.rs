@@ -69,6 +69,14 @@ impl RunFolder {
         RunFolder { path: path.into() }.with_sub_folders()
     }
 
+    /// The folder of a run that began before; what it left stays.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where nothing can be written.
+    pub fn open(path: &Path) -> Result<RunFolder> {
+        RunFolder { path: path.into() }.with_sub_folders()
+    }
+
     fn with_sub_folders(self) -> Result<RunFolder> {
         for folder in SUB_FOLDERS.map(|name| self.path.join(name)) {
             fs::create_dir_all(&folder).map_err(failed("create", &folder))?;

@@ -3,6 +3,7 @@
 use super::run_folder::RunFolder;
 use crate::error::{Error, Result, Warning};
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -116,6 +117,11 @@ impl Status {
         }
     }
 
+    /// Reads that of a run; `None` where there is none.
+    pub fn read(run: &Path) -> Option<Status> {
+        serde_json::from_slice(&std::fs::read(run.join("status.json")).ok()?).ok()
+    }
+
     /// Writes `status.json`, atomically.
     ///
     /// # Errors
@@ -126,7 +132,7 @@ impl Status {
 }
 
 /// Writes a value as indented JSON that ends with a newline, atomically.
-pub(super) fn write_json(run: &RunFolder, name: &str, value: &impl Serialize) -> Result<()> {
+pub(in crate::report) fn write_json(run: &RunFolder, name: &str, value: &impl Serialize) -> Result<()> {
     let json = serde_json::to_string_pretty(value).map_err(|error| Error::Io {
         action: "write",
         path: run.path().join(name),

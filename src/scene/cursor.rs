@@ -283,6 +283,11 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// Notes that a key, which is absent, must be there.
+    pub fn require(&mut self, key: &'static str, example: &'static str) {
+        self.missing.push((key, example));
+    }
+
     /// Whether a key is there; it still has to be asked for.
     pub fn has(&self, key: &str) -> bool {
         self.entry_key(key).is_some()

@@ -6,6 +6,7 @@ use super::contacts;
 use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader, Table};
 use super::face;
 use super::nearest::nearest;
+use super::objectives;
 use super::references::References;
 use super::registration::{self, MOST_FRAMES};
 use super::spec::*;
@@ -52,6 +53,10 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
             if !file.has("bone") {
                 file.must_hold("muscle", "[[muscle]]\nname = \"slab\"\n...");
             }
+        }
+        if let (Some(Some(fit)), Some(markers), true) = (&fit, &markers, fitting) {
+            objectives::need_deviations(fit, markers, mistakes);
+            objectives::agree_with_head(fit, mistakes);
         }
         let solver = file.or("solver", SolverSpec::default(), |item| item.table(solver));
         let output = file.or("output", OutputSpec::default(), |item| item.table(output));
@@ -529,6 +534,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let allow_truncated = table.or("allow_truncated", false, |item| item.flag());
     let allow_unchecked = table.or("allow_unchecked", false, |item| item.flag());
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
+    let objectives = objectives::objectives(table, references, unknowns.as_deref());
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let frames_place = table.place_of("frames");
@@ -547,6 +553,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         allow_truncated: allow_truncated?,
         allow_unchecked: allow_unchecked?,
         sd_mm: sd_mm?,
+        objectives: objectives?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
         registration: registration?,

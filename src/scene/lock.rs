@@ -3,6 +3,7 @@
 //! Every struct is taken apart field by field: a new field that is not written here does not compile.
 
 use super::Scene;
+use super::objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
 use super::spec::*;
 use super::units::Units;
 
@@ -377,6 +378,40 @@ fn control_line(control: &ControlSpec) -> String {
     }
 }
 
+/// All but the priors, which are tables of their own.
+fn objective_lines(objectives: &ObjectivesSpec, lines: &mut Vec<String>) {
+    let ObjectivesSpec {
+        loss,
+        effort,
+        sparsity,
+        similarity,
+        clip,
+        smoothness: SmoothSpec { first, second },
+        priors: _,
+    } = objectives;
+    lines.push(match clip {
+        ClipSpec::Causal => "clip = \"causal\"".into(),
+        ClipSpec::Smoother => "clip = \"smoother\"".into(),
+    });
+    lines.push(match loss {
+        MarkerLossSpec::Quadratic => "loss = \"quadratic\"".into(),
+        MarkerLossSpec::HuberSds(sds) => format!("loss = {{ huber_sds = {} }}", number(*sds)),
+        MarkerLossSpec::CauchySds(sds) => format!("loss = {{ cauchy_sds = {} }}", number(*sds)),
+    });
+    lines.extend(effort.map(|EffortSpec { sd, exponent, by_volume }| {
+        let by = if by_volume { "volume" } else { "muscle" };
+        format!("effort = {{ sd = {}, exponent = {}, by = \"{by}\" }}", number(sd), number(exponent))
+    }));
+    lines.extend(sparsity.map(|scale| format!("sparsity = {{ scale = {} }}", number(scale))));
+    lines.extend(similarity.map(|sd| format!("similarity = {{ sd = {} }}", number(sd))));
+    let rates = [("sd_per_root_s", first), ("sd_per_root_s3", second)];
+    let rates = rates.into_iter().filter_map(|(key, sd)| Some(format!("{key} = {}", number((*sd)?))));
+    let rates: Vec<String> = rates.collect();
+    if !rates.is_empty() {
+        lines.push(format!("smoothness = {{ {} }}", rates.join(", ")));
+    }
+}
+
 fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     let FitSpec {
         markers,
@@ -389,6 +424,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         allow_truncated,
         allow_unchecked,
         sd_mm,
+        objectives,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
         registration:
@@ -427,6 +463,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         format!("allow_unchecked = {allow_unchecked}"),
     ]);
     lines.extend(sd_mm.map(|sd_mm| format!("sd_mm = {}", number(sd_mm))));
+    objective_lines(objectives, lines);
     lines.extend([
         format!("max_marker_distance_mm = {}", number(*max_marker_distance_mm)),
         format!("frames = {{ first = {first}, {last}step = {step} }}"),
@@ -445,5 +482,9 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         }
         HeadSpec::Estimate => lines.extend(["\n[fit.head]".into(), "estimate = true".into()]),
         HeadSpec::PoseTopic(topic) => lines.extend(["\n[fit.head]".into(), format!("pose_topic = {}", text(topic))]),
+    }
+    for PriorSpec { csv, sd, gain, delay_s } in &objectives.priors {
+        lines.extend(["\n[[fit.prior]]".into(), format!("csv = {}", path(csv)), format!("sd = {}", number(*sd))]);
+        lines.extend([format!("gain = {}", number(*gain)), format!("delay_s = {}", number(*delay_s))]);
     }
 }

@@ -17,6 +17,7 @@ mod fibres;
 mod interpret;
 mod lock;
 mod nearest;
+mod objectives;
 mod overrides;
 mod references;
 mod registration;
@@ -30,6 +31,8 @@ pub use face::{FACE, built_in_face};
 pub use fibres::{
     AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
 };
+pub use objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
+pub use references::expected_ranges;
 pub use spec::*;
 pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};
 pub use units::Units;

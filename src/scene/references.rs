@@ -156,6 +156,24 @@ impl References {
         Some(path)
     }
 
+    /// Reads a table of what controls are expected to be, which may be in any unit, and notes if it has a column for none of
+    /// the `unknowns`.
+    pub fn expected(&self, path: &Path, unknowns: Option<&[String]>, item: &Item) -> Option<()> {
+        let Some(unknowns) = unknowns.filter(|_| self.on_disk) else { return Some(()) };
+        let curves = match Curves::read(path, &expected_ranges(self.ranges(None))) {
+            Ok(curves) => curves,
+            Err(error) => {
+                error.into_mistakes().into_iter().for_each(|mistake| item.mistakes.add(mistake));
+                return None;
+            }
+        };
+        if curves.names.iter().any(|name| unknowns.contains(name)) {
+            return Some(());
+        }
+        let count = format!("no column for any of {}", unknowns.join(", "));
+        item.wrong_length(&count, "at least one")
+    }
+
     /// Reads a table of curves once, and notes if it has no column for this control.
     fn column(&self, path: &Path, name: &str, ranges: &[ControlRange], control: &Item) -> Option<()> {
         if !self.on_disk {
@@ -182,6 +200,12 @@ impl References {
         control.mistakes.add(Error::UnknownName { kind: "column", name: name.into(), help, place });
         None
     }
+}
+
+/// Controls that may have any value: of a table that is still multiplied by a gain.
+pub fn expected_ranges(ranges: Vec<ControlRange>) -> Vec<ControlRange> {
+    let any = |range| ControlRange { lower: f64::NEG_INFINITY, upper: f64::INFINITY, ..range };
+    ranges.into_iter().map(any).collect()
 }
 
 /// The angle or way of a bone, within its bounds.

@@ -3,6 +3,7 @@
 //! Every number here is finite and within its range, every name that refers to a muscle refers to one, every path is
 //! absolute. What needs geometry (is the muscle inside its host?) is asked later, and points back through `place`.
 
+use super::objectives::ObjectivesSpec;
 use super::units::Units;
 use crate::error::Place;
 use crate::math::factor::Precision;
@@ -790,6 +791,8 @@ pub struct FitSpec {
     pub allow_unchecked: bool,
     /// The standard deviation of the measurement per coordinate, mm, if it is known.
     pub sd_mm: Option<f64>,
+    /// What is minimised.
+    pub objectives: ObjectivesSpec,
     /// A marker further than this from the surface of the model is a mistake, mm.
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.

@@ -11,7 +11,7 @@ use crate::forward::{Equilibrium, Solver, Work};
 use crate::markers::Recording;
 use crate::mesh::MaterialPoint;
 use crate::model::build::{Built, build};
-use crate::scene::{Change, Scene, Task};
+use crate::scene::{Change, ClipSpec, Scene, Task};
 use std::path::Path;
 use std::time::Instant;
 
@@ -96,7 +96,13 @@ impl Prepared {
                 let markers = placement::place(&self.scene, spec, self.built.model.mesh(), recording)?;
                 let start = Instant::now();
                 let mut fit = Fit::new(&self.built.model, &self.scene, spec, recording)?;
-                let found: Vec<_> = frames.iter().map(|frame| fit.frame(recording, *frame)).collect::<Result<_>>()?;
+                let mut found: Vec<_> =
+                    frames.iter().map(|frame| fit.frame(recording, *frame)).collect::<Result<_>>()?;
+                if spec.objectives.clip == ClipSpec::Smoother {
+                    let passed: Vec<_> = found.drain(..).map(Some).collect();
+                    let smoothed = fit.smooth(recording, frames, &passed, &|| false)?;
+                    found = smoothed.into_iter().flat_map(|clip| clip.frames).collect::<Result<_>>()?;
+                }
                 Ok(Solution {
                     seconds: start.elapsed().as_secs_f64(),
                     times_s: found.iter().map(|estimate| estimate.time_s).collect(),

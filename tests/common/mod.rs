@@ -1,6 +1,8 @@
 //! What the conformance tests share: random numbers, rotations, curved meshes.
 #![allow(dead_code)] // every test file is a crate of its own and uses a part
 
+pub mod twin;
+
 use risorius::math::tensor::{Matrix, Vector, determinant, normalised, rotation};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

@@ -3,8 +3,9 @@
 use crate::model::{MUSCLES, model};
 use crate::support::{FRAME, solved, some_markers};
 use risorius::fit::covariance::Bound;
+use risorius::fit::identifiability::ClipKnowledge;
 use risorius::mesh::MaterialPoint;
-use risorius::report::summary::{FitSummary, FittedFrame, ForwardSummary, MarkerErrors, MeshErrors};
+use risorius::report::summary::{FitSummary, FittedFrame, ForwardSummary, MarkerErrors, MeshErrors, Outliers};
 use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
 
@@ -68,6 +69,10 @@ fn fit_summary_marks_bounds_and_the_worst_markers() {
         frames_failed: 0,
         errors: &errors,
         mesh_errors: &MeshErrors::default(),
+        objective: "markers by squares",
+        outliers: &Outliers::default(),
+        told: &ClipKnowledge::default(),
+        markers: &[],
         iterations: 1,
         seconds: 2.0,
         folder: "runs/smile-0001",

@@ -1,7 +1,8 @@
 //! The page of a fit.
 
-use super::{MarkerErrors, MeshErrors, columns, count, optional};
+use super::{MarkerErrors, MeshErrors, Outliers, ToldSummary, columns, count, optional};
 use crate::fit::covariance::Bound;
+use crate::fit::identifiability::ClipKnowledge;
 use crate::report::frame::Frame;
 use std::fmt;
 
@@ -40,6 +41,14 @@ pub struct FitSummary<'a> {
     pub errors: &'a MarkerErrors,
     /// What was estimated of the mesh's error.
     pub mesh_errors: &'a MeshErrors,
+    /// What was minimised.
+    pub objective: &'a str,
+    /// Markers that a robust loss set aside.
+    pub outliers: &'a Outliers,
+    /// What the markers tell.
+    pub told: &'a ClipKnowledge,
+    /// Names of the markers.
+    pub markers: &'a [String],
     /// Newton iterations of all frames.
     pub iterations: usize,
     /// Wall time, s.
@@ -67,10 +76,15 @@ impl fmt::Display for FitSummary<'_> {
             frames => self.of_clip(frames, out)?,
         }
         self.of_markers(out)?;
+        write!(out, "{}", self.outliers)?;
+        writeln!(out, "  minimised: {}", self.objective)?;
         if !self.recording.is_empty() {
             write!(out, "\n{}", self.recording)?;
         }
         write!(out, "{}", self.mesh_errors)?;
+        let kind = if self.bones { "control" } else { "muscle" };
+        let told = ToldSummary { clip: self.told, controls: self.controls, markers: self.markers, kind };
+        write!(out, "{told}")?;
         let folder = self.folder;
         writeln!(out, "\nnext: shapes and residuals in {folder}/view/result.pvd and markers.pvd (ParaView)")?;
         writeln!(out, "      numbers in {folder}/tables/activations.csv and markers.csv")

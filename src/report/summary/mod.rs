@@ -4,11 +4,15 @@ mod fit;
 mod forward;
 mod marker_errors;
 mod mesh_errors;
+mod outliers;
+mod told;
 
 pub use fit::{FitSummary, FittedFrame};
 pub use forward::ForwardSummary;
 pub use marker_errors::{ErrorsOf, MarkerErrors};
 pub use mesh_errors::MeshErrors;
+pub use outliers::Outliers;
+pub use told::ToldSummary;
 
 /// Lines of a table: the first column to the left, the others to the right, two blanks between, two in front. No lines
 /// where there are no rows.

@@ -2,7 +2,7 @@
 
 use super::{Cell, Rows, Table, of_frame};
 use crate::error::Result;
-use crate::fit::sequence::FitIteration;
+use crate::fit::estimate::FitIteration;
 use crate::report::frame::Frame;
 use crate::report::run_folder::RunFolder;
 

@@ -12,8 +12,10 @@ mod energies;
 mod estimate;
 mod fit;
 mod head;
+mod identifiability;
 mod markers;
 mod muscles;
+mod objectives;
 mod probes;
 mod registration;
 
@@ -26,8 +28,10 @@ pub use energies::EnergyTable;
 pub use estimate::EstimateTable;
 pub use fit::FitTable;
 pub use head::{FreeHeadRow, HeadRow, write_free_head, write_head};
+pub use identifiability::{IdentifiabilityTables, advice_table};
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
+pub use objectives::{ObjectiveTable, OutlierTable};
 pub use probes::ProbeTable;
 pub use registration::{Placement, write_registration};
 

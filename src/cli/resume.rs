@@ -1,0 +1,37 @@
+//! `risorius resume RUN`: goes on after Ctrl-C, a crash or a full disk.
+
+use super::problem::Source;
+use super::run::{self, Run};
+use super::terminal::tell;
+use super::{Ending, Flags};
+use crate::error::{Error, Result};
+use crate::report::state::{Checkpoints, Guard};
+use crate::report::{Outcome, Status};
+use std::path::Path;
+
+pub(super) fn resume(folder: &Path, flags: &Flags) -> Result<Ending> {
+    let guard = Guard::read(folder)?;
+    let mut changes = guard.changes(folder);
+    if !flags.set().is_empty() || flags.accuracy.is_some() {
+        changes.push("what the flags set".into());
+    }
+    if !changes.is_empty() {
+        return Err(Error::ProblemChanged { path: folder.into(), changes: changes.join(", ").into() });
+    }
+    if let Some(Outcome::Converged | Outcome::Partial) = Status::read(folder).map(|status| status.status) {
+        tell(&format!("nothing to do: the fit in {} went to its end\n", folder.display()));
+        return Ok(Ending::Ok);
+    }
+    let checkpoints = Checkpoints::open(folder)?;
+    let left = checkpoints.left()?;
+    let source = Source::read(Some(&folder.join("problem.lock.toml")), flags)?;
+    let prepared = super::prepare::prepare(&source)?;
+    flags.warn(&prepared.warnings);
+    if !flags.quiet {
+        tell(&format!("{} frames are done\n", left.frames.len()));
+    }
+    if flags.dry_run {
+        return Ok(Ending::Ok);
+    }
+    run::go_on(&source, &prepared, Run::again(folder, guard.inputs)?, flags, (checkpoints, left))
+}
