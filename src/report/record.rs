@@ -82,7 +82,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Writes a frame. `deviations`, `markers` and `iterations` of a fit are empty for a task that has none.
+    /// Writes a frame, all but its activations. `markers` and `iterations` of a fit are empty for a task that has none.
     ///
     /// # Errors
     /// Where a file cannot be written.
@@ -90,13 +90,11 @@ impl<'a> Record<'a> {
         &mut self,
         frame: Frame,
         equilibrium: &Equilibrium,
-        deviations: &[Option<f64>],
         markers: &[MarkerPair<'_>],
         iterations: &[FitIteration],
     ) -> Result<()> {
         let start = Instant::now();
         let state = &equilibrium.state;
-        self.activations.add(frame, &state.controls, deviations)?;
         self.energies.add(frame, self.model, equilibrium)?;
         self.convergence.add(frame, &equilibrium.history)?;
         if let Some(table) = &mut self.muscles {
@@ -121,6 +119,15 @@ impl<'a> Record<'a> {
         self.frames += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Writes the activations of a frame, the last of its rows: a frame that stands in `activations.csv` is complete, whatever
+    /// ended the run. `deviations` are empty for a task that has none.
+    ///
+    /// # Errors
+    /// Where the row cannot be written.
+    pub fn done(&mut self, frame: Frame, equilibrium: &Equilibrium, deviations: &[Option<f64>]) -> Result<()> {
+        self.activations.add(frame, &equilibrium.state.controls, deviations)
     }
 
     /// Writes what the markers of a frame tell; `names` are those of all controls and of all markers, `biases` one per control

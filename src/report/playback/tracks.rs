@@ -124,14 +124,14 @@ pub(super) fn markers(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Marker>> {
     let mut markers: Vec<Marker> = Vec::new();
     for row in 0..sheet.len() {
         let index = sheet.count(row, frame)?;
-        // a run that was killed may have written the markers of a frame and not its activations
+        // activations come last: a run that was killed may have written the markers of a frame without them
         if !frames.iter().any(|known| known.index == index) {
             continue;
         }
         let [x, y, z] = model;
         let model = [sheet.known(row, x)?, sheet.known(row, y)?, sheet.known(row, z)?];
         let [x, y, z] = measured;
-        let measured = match (sheet.number(row, x)?, sheet.number(row, y)?, sheet.number(row, z)?) {
+        let measured = match (sheet.finite(row, x)?, sheet.finite(row, y)?, sheet.finite(row, z)?) {
             (Some(x), Some(y), Some(z)) => Some([x, y, z]),
             _ => None,
         };
@@ -142,9 +142,13 @@ pub(super) fn markers(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Marker>> {
         });
         markers[at].samples.push(Sample { model, measured });
     }
-    // a frame whose markers were not all written is none
-    markers.retain(|marker| marker.samples.len() == frames.len());
-    Ok(markers)
+    match markers.iter().find(|marker| marker.samples.len() != frames.len()) {
+        None => Ok(markers),
+        Some(marker) => {
+            let (name, rows) = (&marker.name, marker.samples.len());
+            Err(sheet.damaged(format!("marker `{name}` has {rows} rows for {} frames", frames.len())))
+        }
+    }
 }
 
 pub(super) fn effort(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Effort>> {
