@@ -1,7 +1,8 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
 use super::frame::{
-    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_states, muscle_states, probe_states,
+    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_points, contact_sums, muscle_states,
+    probe_states,
 };
 use super::run_folder::RunFolder;
 use super::tables::{
@@ -95,6 +96,7 @@ impl<'a> Record<'a> {
     ) -> Result<()> {
         let start = Instant::now();
         let state = &equilibrium.state;
+        let contacts = contact_points(self.model, state);
         self.energies.add(frame, self.model, equilibrium)?;
         self.convergence.add(frame, &equilibrium.history)?;
         if let Some(table) = &mut self.muscles {
@@ -104,7 +106,7 @@ impl<'a> Record<'a> {
             table.add(frame, &bone_states(self.model, state, &equilibrium.evaluation))?;
         }
         if let Some(table) = &mut self.contacts {
-            table.add(frame, &contact_states(self.model, state))?;
+            table.add(frame, &contact_sums(self.model, &contacts))?;
         }
         if let Some((table, fit, ..)) = &mut self.fit {
             table.add(frame, markers)?;
@@ -114,7 +116,7 @@ impl<'a> Record<'a> {
             table.add(frame, state, &probe_states(self.probes, self.model, state))?;
         }
         if self.output.view && self.frames.is_multiple_of(self.output.every) {
-            self.view.add(frame, self.model, state, markers)?;
+            self.view.add(frame, self.model, state, markers, &contacts)?;
         }
         self.frames += 1;
         self.seconds += start.elapsed().as_secs_f64();
