@@ -126,11 +126,11 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     run.write_running(&Tally::default())?;
     let mut work = Work::default();
     let outcome = task(&source, &prepared, &run, flags, (checkpoints.as_ref(), None), &mut work);
-    let ending = finish(&run, Some(&built.model), &work, outcome, flags)?;
-    if ending == Ending::Interrupted && checkpoints.is_some() {
-        tell(&format!("go on with: risorius resume {}\n", run.folder.path().display()));
+    let ending = finish(&run, Some(&built.model), &work, outcome, flags);
+    if checkpoints.is_some() {
+        tell_resume(&ending, run.folder.path());
     }
-    Ok(ending)
+    ending
 }
 
 /// Goes on with a fit that was interrupted.
@@ -143,7 +143,9 @@ pub(super) fn go_on(
 ) -> Result<Ending> {
     let mut work = Work::default();
     let outcome = task(source, prepared, &run, flags, (Some(&checkpoints), Some(left)), &mut work);
-    finish(&run, Some(&prepared.built.model), &work, outcome, flags)
+    let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags);
+    tell_resume(&ending, run.folder.path());
+    ending
 }
 
 fn task(
@@ -186,43 +188,55 @@ pub(super) fn finish(
     outcome: Result<Tally>,
     flags: &Flags,
 ) -> Result<Ending> {
-    run.manifest(model, work)?;
-    match outcome {
-        Ok(tally) => {
-            let Tally { frames_ok, failed, interrupted, warnings } = tally;
-            let ending = match failed.len() {
-                _ if interrupted => Ending::Interrupted,
-                0 if !warnings.is_empty() && flags.strict => Ending::Warned,
-                0 => Ending::Ok,
-                _ => Ending::NotConverged,
-            };
+    let manifest = run.manifest(model, work);
+    // the first error is the one to tell
+    let ended = outcome.and_then(|tally| manifest.and_then(|()| conclude(run, tally, flags)));
+    if let Err(error) = &ended {
+        Status::write_failed(&run.folder, error);
+        let frames = Status::read(run.folder.path()).map_or(0, |status| status.frames_ok);
+        if frames > 0 {
             let folder = run.folder.path().display();
-            match ending {
-                Ending::Interrupted => {
-                    tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n"))
-                }
-                Ending::NotConverged => tell(&format!(
-                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json){}",
-                    failed.len(),
-                    frames_ok + failed.len(),
-                    more_about(failed.iter().map(|frame| frame.code.as_str()))
-                )),
-                Ending::Ok | Ending::Warned => {}
-            }
-            let status = match interrupted {
-                true => Status::interrupted(frames_ok, failed),
-                false => Status::finished(frames_ok, failed),
-            };
-            Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
-            if frames_ok > 0 {
-                write_page(&run.folder, flags)?;
-            }
-            Ok(ending)
+            tell(&format!("ended early: {frames} frames are finished and kept in {folder}\n"));
         }
-        Err(error) => {
-            Status::failed(0, Vec::new(), &error).write(&run.folder)?;
-            Err(error)
-        }
+    }
+    ended
+}
+
+/// Writes and says how the frames of a run ended.
+fn conclude(run: &Run, tally: Tally, flags: &Flags) -> Result<Ending> {
+    let Tally { frames_ok, failed, interrupted, warnings } = tally;
+    let ending = match failed.len() {
+        _ if interrupted => Ending::Interrupted,
+        0 if !warnings.is_empty() && flags.strict => Ending::Warned,
+        0 => Ending::Ok,
+        _ => Ending::NotConverged,
+    };
+    let folder = run.folder.path().display();
+    match ending {
+        Ending::Interrupted => tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n")),
+        Ending::NotConverged => tell(&format!(
+            "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json){}",
+            failed.len(),
+            frames_ok + failed.len(),
+            more_about(failed.iter().map(|frame| frame.code.as_str()))
+        )),
+        Ending::Ok | Ending::Warned => {}
+    }
+    let status = match interrupted {
+        true => Status::interrupted(frames_ok, failed),
+        false => Status::finished(frames_ok, failed),
+    };
+    Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
+    if frames_ok > 0 {
+        write_page(&run.folder, flags)?;
+    }
+    Ok(ending)
+}
+
+/// Says how a fit that did not come to its end goes on.
+fn tell_resume(ending: &Result<Ending>, folder: &Path) {
+    if let Ok(Ending::Interrupted) | Err(Error::Io { .. }) = ending {
+        tell(&format!("go on with: risorius resume {}\n", folder.display()));
     }
 }
 
