@@ -166,6 +166,29 @@ impl<'m> Fit<'m> {
         Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
     }
 
+    /// Lets a body come to rest that was in equilibrium with nearly the same model: same controls, same loads. The next frame
+    /// starts from there.
+    ///
+    /// # Errors
+    /// An equilibrium that is not found.
+    pub fn settle(&mut self, near: &Equilibrium) -> Result<()> {
+        let to = Drive { controls: near.state.controls.clone(), load: near.state.load };
+        self.last = self.solver.equilibrium_near(&near.state, &near.state, &to)?;
+        self.directions = None;
+        Ok(())
+    }
+
+    /// Weighted residuals of a frame at the controls of an equilibrium of nearly the same model.
+    ///
+    /// # Errors
+    /// A frame without markers, an equilibrium that is not found.
+    pub fn residuals_near(&mut self, recording: &Recording, frame: usize, near: &Equilibrium) -> Result<Vec<f64>> {
+        let (_, measured) = self.shown(recording, frame)?;
+        self.settle(near)?;
+        let q: Vec<f64> = self.unknowns.iter().map(|k| near.state.controls[*k]).collect();
+        self.problem(recording.frames[frame].time_s, measured).apply(&q).map_err(own_error)
+    }
+
     /// The estimate of a frame for controls that are known, one for each that is sought: nothing is searched.
     ///
     /// # Errors
