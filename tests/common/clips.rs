@@ -133,7 +133,9 @@ pub fn truth(frames: usize) -> Vec<Vec<f64>> {
 fn problem(fit: &str, set: &[&str]) -> Scene {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/beam");
     let text = std::fs::read_to_string(folder.join("problem.toml")).expect("the problem");
-    let text = text.replace("../../data/beam.mcap", "clip.mcap").replace("units = \"m\"\n", &format!("units = \"m\"\n{fit}"));
+    let text = text
+        .replace("../../data/beam.mcap", "clip.mcap")
+        .replace("units = \"m\"\n", &format!("units = \"m\"\n{fit}"));
     let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
     Scene::parse(&text, "problem.toml", &folder, &set).unwrap_or_else(|error| panic!("{error}"))
 }
