@@ -19,6 +19,7 @@ pub mod frame;
 pub mod free_head;
 pub mod gauss_newton;
 pub mod head;
+mod head_error;
 pub mod identifiability;
 pub mod objective;
 mod observed;

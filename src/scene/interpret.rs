@@ -57,7 +57,6 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         }
         if let (Some(Some(fit)), Some(markers), true) = (&fit, &markers, fitting) {
             objectives::need_deviations(fit, markers, mistakes);
-            objectives::agree_with_head(fit, mistakes);
             if let (Some(muscles), Some(regions)) = (&muscles, &regions) {
                 outer::check(fit, (muscles, regions), markers, mistakes);
             }

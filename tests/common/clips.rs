@@ -50,15 +50,6 @@ pub struct Conditions {
     pub head: Head,
 }
 
-/// What a fit is asked for.
-#[derive(Debug, Clone, Copy)]
-pub struct Asked {
-    /// Whether the clip is smoothed.
-    pub smoothed: bool,
-    /// Whether the error of the mesh is estimated.
-    pub estimate: bool,
-}
-
 /// Sums over fitted frames.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Score {
@@ -222,45 +213,54 @@ fn normal(random: &mut super::Random) -> f64 {
     (-2.0 * u.ln()).sqrt() * (2.0 * PI * v).cos()
 }
 
-/// Fits a recording frame by frame, and the clip as a whole where that is asked for, and compares with the truth.
-pub fn fit(path: &Path, truth: &[Vec<f64>], conditions: &Conditions, asked: &Asked) -> Score {
+/// Fits a recording frame by frame, then the clip as a whole, and compares both with the truth; with `estimate` the error of the
+/// mesh is estimated.
+pub fn fit(path: &Path, truth: &[Vec<f64>], conditions: &Conditions, estimate: bool) -> [Score; 2] {
     let head = match conditions.head {
-        Head::Bones => {
-            "loss = { cauchy_sds = 4 }\n[fit.head]\nbone_markers = [\"H0\", \"H1\", \"H2\", \"H3\", \"H4\", \"H5\"]"
-        }
-        Head::Estimated => "[fit.head]\nestimate = true",
+        Head::Bones => "[fit.head]\nbone_markers = [\"H0\", \"H1\", \"H2\", \"H3\", \"H4\", \"H5\"]\n",
+        Head::Estimated => "[fit.head]\nestimate = true\n",
     };
-    let smooth = "smoothness = { sd_per_root_s3 = 0.3 }\nclip = \"smoother\"\n";
-    let smooth = if asked.smoothed { smooth } else { "" };
-    let text = format!("neutral = 0\nsd_mm = {}\n{smooth}{head}\n", conditions.noise_mm);
-    let scene = problem(&text, &[FITTED]);
-    let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let read_as = |lines: &str| {
+        let scene = problem(
+            &format!("neutral = 0\nsd_mm = {}\nloss = {{ cauchy_sds = 4 }}\n{lines}{head}", conditions.noise_mm),
+            &[FITTED],
+        );
+        let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
+        (scene, built)
+    };
+    let (scene, built) = read_as("");
+    let (tied, _) = read_as("smoothness = { sd_per_root_s3 = 0.3 }\nclip = \"smoother\"\n");
     let model = &built.model;
     let spec = scene.fit.as_ref().expect("a fit");
     let mut clip = read(path, &ReadOptions { units: Units::M, ..ReadOptions::default() }).expect("read");
     let placed = placement::place(&scene, spec, model.mesh(), &clip).unwrap_or_else(|error| panic!("{error}"));
     register(&scene, spec, model.mesh(), &placed, &mut clip, None).unwrap_or_else(|error| panic!("{error}"));
-    let mut fit = Fit::new(model, &scene, spec, &clip).unwrap_or_else(|error| panic!("{error}"));
+    let mut alone = Fit::new(model, &scene, spec, &clip).unwrap_or_else(|error| panic!("{error}"));
     let frames: Vec<usize> = (0..truth.len()).collect();
-    let mut found: Vec<Option<Estimate>> = frames.iter().map(|k| fit.frame(&clip, *k).ok()).collect();
-    if asked.smoothed {
-        let smoothed = fit.smooth(&clip, &frames, &found, &|| false).unwrap_or_else(|error| panic!("{error}"));
-        found = smoothed.expect("to its end").frames.into_iter().map(Result::ok).collect();
-    }
-    let halved = asked.estimate.then(|| Halved::new(&scene, model).unwrap_or_else(|w| panic!("{}", w.message)));
+    let found: Vec<Option<Estimate>> = frames.iter().map(|k| alone.frame(&clip, *k).ok()).collect();
+    let mut whole = Fit::new(model, &tied, tied.fit.as_ref().expect("a fit"), &clip).expect("as before");
+    let smoothed = whole.smooth(&clip, &frames, &found, &|| false).unwrap_or_else(|error| panic!("{error}"));
+    let smoothed: Vec<Option<Estimate>> = smoothed.expect("to its end").frames.into_iter().map(Result::ok).collect();
+
+    let halved = estimate.then(|| Halved::new(&scene, model).unwrap_or_else(|w| panic!("{}", w.message)));
     let mut estimator =
         halved.as_ref().map(|halved| Estimator::new(model, halved, settings(&scene)).expect("memory"));
-    let points: Vec<_> = fit.markers().iter().map(|m| m.point).collect();
-    let mut score = Score::default();
-    for estimate in found.iter().flatten() {
-        let biases = estimator.as_mut().map(|estimator| {
-            let state = &estimate.equilibrium.state;
+    let points: Vec<_> = alone.markers().iter().map(|m| m.point).collect();
+    let mut scores = [Score::default(); 2];
+    for frame in found.iter().zip(&smoothed) {
+        // the states of both are so near each other that one estimate of the mesh does for both
+        let shift = frame.0.as_ref().zip(estimator.as_mut()).map(|(fitted, estimator)| {
+            let state = &fitted.equilibrium.state;
             let corrected = estimator.corrected(state).unwrap_or_else(|error| panic!("{error}"));
-            bias(estimate, fit.markers(), fit.unknowns(), &estimator.shift(state, &corrected, &points))
+            estimator.shift(state, &corrected, &points)
         });
-        score.count(estimate, &fit, &truth[estimate.frame], biases.as_deref().unwrap_or_default());
+        for (score, fitted) in scores.iter_mut().zip([frame.0, frame.1]) {
+            let Some(fitted) = fitted else { continue };
+            let biases = shift.as_ref().map(|shift| bias(fitted, alone.markers(), alone.unknowns(), shift));
+            score.count(fitted, &alone, &truth[fitted.frame], biases.as_deref().unwrap_or_default());
+        }
     }
-    score
+    scores
 }
 
 impl Score {
