@@ -1,14 +1,14 @@
 //! Fits clips whose activations are known and writes what came of it: `cargo run --release --example twin_table [OUT]`.
 //!
-//! The clips are those of `tests/common/clips.rs`, three with other random numbers for every row. The table goes to
-//! `problems/twins/README.md`, or to the file OUT.
+//! The clips are those of `tests/common/clips.rs`, three with other random numbers for every row. The table takes the place of the
+//! one in `problems/fit_study/README.md`, or goes to the file OUT.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
 
 use common::clips::{Conditions, Head, Score, fit, positions, record, truth};
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const FRAMES: usize = 40;
 const CLIPS: u64 = 3;
@@ -59,7 +59,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     match out {
         Some(out) => std::fs::write(out, table)?,
-        None => println!("{table}"),
+        None => {
+            let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/fit_study/README.md");
+            let text = std::fs::read_to_string(&page)?;
+            let start = text.find("| data from |").ok_or("the page has no table to replace")?;
+            let rows = text[start..].split_inclusive('\n').take_while(|line| line.starts_with('|'));
+            let end = start + rows.map(str::len).sum::<usize>();
+            std::fs::write(page, [&text[..start], &table, &text[end..]].concat())?;
+        }
     }
     Ok(())
 }

@@ -48,7 +48,7 @@ impl HeadError {
         Some(HeadError { own, common, centre })
     }
 
-    /// G of a frame: a row for every control that is sought. `reference` are the places of the measured markers.
+    /// G of a frame: a row for every control that is sought.
     pub fn across(&self, loss: Loss, optimum: Seen<'_>, measured: &[Measured]) -> DMatrix<f64> {
         let Seen { residuals, jacobian } = optimum;
         let n = jacobian.ncols();

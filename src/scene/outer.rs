@@ -200,7 +200,7 @@ pub(super) fn outer(table: &mut Table) -> Option<OuterSpec> {
         if let Some(first) = unknowns[..k].iter().find(|other| other.what == unknown.what) {
             table.mistakes().add(Error::DuplicateName {
                 kind: "outer unknown",
-                name: unknown.what.label().into(),
+                name: unknown.what.label(),
                 first_line: first.place.line,
                 place: unknown.place.clone(),
             });
