@@ -30,6 +30,18 @@
 //! Each line of Pi is one [`term::Term`]; an effect that a scene does not name has no term. Displacement is interpolated by
 //! tricubic Hermite hexahedra, pressure by one of [`term::pressure::PRESSURE_SPACES`].
 //!
+//! # Where to read on
+//!
+//! | what | where |
+//! |---|---|
+//! | every key of a problem file, every table of a run, the face, recordings, what was checked, how to add to it | [`guide`] |
+//! | tissue: incompressible, with its laws | [`term::tissue`], [`material`] |
+//! | muscles: fibres, quadrature, soft ends | [`term::muscle`], [`material::fibre`], [`term::muscle_rule`], [`term::taper`] |
+//! | loads: gravity, traction, follower pressure, forces on points | [`term::load`] |
+//! | contact and sliding: surfaces, laws, two faces that yield | [`term::contact`], [`term::contact::mutual`] |
+//! | springs, ties, bones, supports | [`term::spring`], [`term::tie`], [`term::bone`], [`model::supports`] |
+//! | what a fit minimises, and what it is sure of | [`fit::objective`], [`fit::identifiability`] |
+//!
 //! # The way of the data
 //!
 //! ```text
@@ -70,6 +82,7 @@ pub mod error;
 pub mod fibres;
 pub mod fit;
 pub mod forward;
+pub mod guide;
 pub mod markers;
 pub mod material;
 pub mod math;

@@ -6,9 +6,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules of the crate, lowest first.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "error", "math", "mesh", "material", "term", "solve", "scene", "model", "forward", "markers", "fibres", "fit",
-    "study", "report", "cli", "main",
+    "study", "report", "cli", "guide", "main",
 ];
 
 /// A reference that should not be there.

@@ -284,7 +284,7 @@ fn what_cannot_be_exported_says_why() {
     fs::create_dir_all(changed.join("view")).unwrap();
     fs::create_dir_all(changed.join("tables")).unwrap();
     fs::write(changed.join("problem.lock.toml"), longer).unwrap();
-    for name in ["status.json", "view/result_0000.exf", "tables/activations.csv"] {
+    for name in ["status.json", "view/result_0000.exf", "tables/activations.csv", "tables/markers.csv"] {
         fs::copy(run().join(name), changed.join(name)).unwrap();
     }
     let (exit, _, stderr) = risorius(&["export", &changed.display().to_string(), "--to", "glb"]);

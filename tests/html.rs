@@ -81,27 +81,70 @@ fn a_fit_leaves_its_page() {
     assert!(exit == 6 && stderr.contains("error[O003]"), "{stderr}");
 }
 
-/// Tables about what the markers tell are shown where a run has them.
+/// What the tables about the markers say is on the page.
 #[test]
-fn what_the_markers_cannot_tell_is_said() {
+fn what_the_markers_can_and_cannot_tell_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let (exit, ..) = risorius(folder.path(), &["run", "--set", "fit.frames={first=10,last=10}", "--out", "run"]);
     assert_eq!(exit, 0);
     let tables = folder.path().join("run/tables");
-    let controls = "frame,time_s,control,value,sd,lower_95,upper_95,bound,wants,prior_sd,prior_dominated,bias\n\
-                    10,0.3,top,0.01,0.2,0.0,0.7,,,0.3,true,\n";
-    fs::write(tables.join("identifiability.csv"), controls).unwrap();
-    fs::write(tables.join("pairs.csv"), "frame,time_s,a,b,correlation\n10,0.3,top,bottom,-0.97\n").unwrap();
-    assert_eq!(risorius(folder.path(), &["report", "run"]).0, 0);
-    let page = fs::read_to_string(folder.path().join("run/report.html")).unwrap();
-    stands_alone(&page);
+    let page = || {
+        assert_eq!(risorius(folder.path(), &["report", "run"]).0, 0);
+        let page = fs::read_to_string(folder.path().join("run/report.html")).unwrap();
+        stands_alone(&page);
+        page
+    };
+    // as it was written: the words of the summary
+    let summary = fs::read_to_string(folder.path().join("run/summary.txt")).unwrap();
+    let least = summary.lines().find(|line| line.contains("seen least over the clip: ")).unwrap();
+    let least = least.split(": ").nth(1).unwrap().split(", to").next().unwrap();
+    let well = page();
     for words in [
-        "<td>0.0000 to 0.7000</td><td>the markers say little</td>",
-        "<td>top, bottom</td><td>1</td><td>-0.97</td>",
-        "says more than the markers",
+        "determined by the markers",
+        &format!("every combination of controls; least {least}, to "),
+        "twice what noise leaves",
     ] {
-        assert!(page.contains(words), "`{words}` is not in the page");
+        assert!(well.contains(words), "`{words}` is not in the page");
     }
+    assert!(!well.contains("told apart") && !well.contains("says more than"));
+
+    // rows as other problems have them, under the headers of this run
+    let replace = |name: &str, rows: &str| {
+        let path = tables.join(name);
+        let header = fs::read_to_string(&path).map_or_else(
+            |_| "number,x_mm,y_mm,z_mm,gain,control,sd_before,sd_after".to_owned(),
+            |text| text.lines().next().unwrap().to_owned(),
+        );
+        for row in rows.lines() {
+            assert_eq!(row.split(',').count(), header.split(',').count(), "{name}: {header}");
+        }
+        fs::write(path, format!("{header}\n{rows}")).unwrap();
+    };
+    replace(
+        "identifiability.csv",
+        "10,0.3,top,0.01,0.2,0.0,0.7,free,,0.3,1,0.004,0\n10,0.3,bottom,0.0,,0.0,0.0004,lower,-0.02,0.3,0,,0\n",
+    );
+    replace("pairs.csv", "10,0.3,top,bottom,-0.97,0.5,0.012,0.001,0.2,0.1,1\n");
+    replace(
+        "combinations.csv",
+        "10,0.3,0,9,0.1,1,1.00 top\n,,0,90,0.01,1,0.70 top + 0.70 bottom\n,,1,0.1,10,0,0.70 top - 0.70 bottom\n",
+    );
+    replace("unexplained.csv", "10,0.3,B01,0,0,1.2,1.2,0.1\n10,0.3,B02,0,0,0.1,0.1,0.1\n");
+    replace("advice.csv", "1,10,20,5,0.5,top,0.2,0.05\n1,10,20,5,0.5,bottom,0.1,0.09\n");
+    let badly = page();
+    for words in [
+        "<td>0.0000 to 0.7000</td><td>the markers say little; the mesh shifts it by 0.004</td>",
+        "<td>0.0000 to 4.0e-4</td><td>on its lower bound; without it at -0.0200</td>",
+        "<td>top, bottom</td><td>1</td><td>-0.97</td><td>top + 0.50 bottom = 0.0120 +/- 0.0020 in frame 10</td>",
+        "says more than the markers",
+        "no marker determines these",
+        "<td>0.70 top - 0.70 bottom</td>",
+        "<td>B01</td><td>1.2</td><td>0.1</td>",
+        "<td>1</td><td>10.0, 20.0, 5.0</td><td>top</td><td>0.2000 to 0.0500</td>",
+    ] {
+        assert!(badly.contains(words), "`{words}` is not in the page");
+    }
+    assert!(!badly.contains("<td>B02</td><td>0.1</td>") && !badly.contains("every combination"));
 }
 
 #[test]

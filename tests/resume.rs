@@ -15,7 +15,8 @@ const FRAMES: usize = 60;
 fn prepare(extra: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let text = problem(&MUSCLES[..3], &MARKERS, &format!("sd_mm = 0.2\n{extra}"));
-    let wave = |k: usize, by: f64| 0.5 - 0.5 * (by + k as f64 / 6.0).cos();
+    // from rest: the first frame must stand where the model does
+    let wave = |k: usize, by: f64| (k as f64 / 4.0).min(1.0) * (0.5 - 0.5 * (by + k as f64 / 6.0).cos());
     let truth: Vec<Vec<f64>> =
         (0..FRAMES).map(|k| vec![0.02 * wave(k, 0.0), 0.02 * wave(k, 1.0), 0.01 * wave(k, 2.0)]).collect();
     record(&folder.path().join("clip.mcap"), &text, &truth, 0.1, 9);

@@ -863,11 +863,11 @@ fn outer_unknowns_are_read_and_written_back() {
     assert_eq!(scene.lock(), again.lock());
 }
 
-/// The problem file that the README shows is one that can be read.
+/// The problem file that the guide shows is one that can be read.
 #[test]
-fn the_problem_file_of_the_readme_is_read() {
-    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
-    let text = readme.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a block of TOML");
+fn the_problem_file_of_the_guide_is_read() {
+    let guide = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/guide/problem_file.md")).unwrap();
+    let text = guide.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a block of TOML");
     for text in [text.to_owned(), text.replace("kind = \"forward\"", "kind = \"fit\"")] {
         let scene = parse(&text, &[]).unwrap_or_else(|error| panic!("{}", render_error(&error, false)));
         assert_eq!((scene.contacts.len(), scene.slidings.len(), scene.regions.len()), (1, 1, 1));

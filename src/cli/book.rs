@@ -84,10 +84,8 @@ impl<'a> Book<'a> {
         let aside = set_aside(&self.names, &markers, &estimate);
         self.errors.add(frame, &markers);
         self.outliers.add(&aside);
-        self.record.frame(frame, &estimate.equilibrium, &estimate.sd, &markers, &estimate.iterations)?;
+        self.record.frame(frame, &estimate.equilibrium, &markers, &estimate.iterations)?;
         self.record.objectives(frame, &estimate.costs, &aside)?;
-        // one that is bridged stays among those that failed
-        self.tally.frames_ok += usize::from(!estimate.bridged);
         let is_known = matches!(beside, Beside::Known { .. });
         let mut warn = |tally: &mut Tally, warnings: Vec<Warning>| match is_known {
             true => tally.keep(frame, &warnings),
@@ -113,6 +111,9 @@ impl<'a> Book<'a> {
         };
         let biases: Vec<_> = error.iter().flat_map(|e| e.biases.iter().map(|(_, bias)| *bias)).collect();
         let help = self.telling.frame(frame, &estimate, fit, (live, known_help), &biases, &mut self.record)?;
+        self.record.done(frame, &estimate.equilibrium, &estimate.sd)?;
+        // one that is bridged stays among those that failed
+        self.tally.frames_ok += usize::from(!estimate.bridged);
         self.heads.extend(estimate.head.clone().map(|head| (estimate.frame, head)));
         self.fitted.push(FittedFrame {
             frame,

@@ -44,7 +44,8 @@ pub(super) fn forward(
         let before = solver.work().iterations;
         match solver.equilibrium(&state, drive) {
             Ok(found) => {
-                record.frame(frame, &found, &[], &[], &[])?;
+                record.frame(frame, &found, &[], &[])?;
+                record.done(frame, &found, &[])?;
                 tally.frames_ok += 1;
                 let iterations = solver.work().iterations - before;
                 let range = found.evaluation.det_f;

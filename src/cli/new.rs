@@ -31,9 +31,14 @@ pub(super) fn new(folder: &Path, template: Template) -> Result<Ending> {
         let source = std::io::Error::new(ErrorKind::AlreadyExists, "it is there already; choose another folder");
         return Err(io("write", path, source));
     }
-    for (path, text) in &paths {
+    for (number, (path, text)) in paths.iter().enumerate() {
         let file = fs::OpenOptions::new().write(true).create_new(true).open(path);
-        file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(|source| io("write", path, source))?;
+        file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(|source| {
+            // all or nothing, so that it can be tried again; the first error is the one to tell
+            let made = number + usize::from(source.kind() != ErrorKind::AlreadyExists);
+            paths[..made].iter().for_each(|(path, _)| drop(fs::remove_file(path)));
+            io("write", path, source)
+        })?;
     }
     let problem = folder.join("problem.toml");
     let mut page = String::new();

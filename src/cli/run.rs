@@ -151,20 +151,27 @@ fn solve(
     (checkpoints, left): (Option<Checkpoints>, Option<Left>),
 ) -> Result<Ending> {
     let mut work = Work::default();
+    let resumable = checkpoints.is_some();
     let settled = match outer::settle(&mut source, prepared, checkpoints, &mut run, flags) {
         Ok(settled) => settled,
-        Err(error) => return finish(&run, None, &work, Err(error), flags),
+        Err(error) => {
+            let ending = finish(&run, None, &work, Err(error), flags);
+            if resumable {
+                tell_resume(&ending, run.folder.path());
+            }
+            return ending;
+        }
     };
     let Settled { prepared, checkpoints, interrupted } = settled;
     let outcome = match interrupted {
         true => Ok(Tally { interrupted, ..Tally::default() }),
         false => task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work),
     };
-    let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags)?;
-    if ending == Ending::Interrupted && checkpoints.is_some() {
-        tell(&format!("go on with: risorius resume {}\n", run.folder.path().display()));
+    let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags);
+    if resumable {
+        tell_resume(&ending, run.folder.path());
     }
-    Ok(ending)
+    ending
 }
 
 fn task(
@@ -208,43 +215,55 @@ pub(super) fn finish(
     outcome: Result<Tally>,
     flags: &Flags,
 ) -> Result<Ending> {
-    run.manifest(model, work)?;
-    match outcome {
-        Ok(tally) => {
-            let Tally { frames_ok, failed, interrupted, warnings } = tally;
-            let ending = match failed.len() {
-                _ if interrupted => Ending::Interrupted,
-                0 if !warnings.is_empty() && flags.strict => Ending::Warned,
-                0 => Ending::Ok,
-                _ => Ending::NotConverged,
-            };
+    let manifest = run.manifest(model, work);
+    // the first error is the one to tell
+    let ended = outcome.and_then(|tally| manifest.and_then(|()| conclude(run, tally, flags)));
+    if let Err(error) = &ended {
+        Status::write_failed(&run.folder, error);
+        let frames = Status::read(run.folder.path()).map_or(0, |status| status.frames_ok);
+        if frames > 0 {
             let folder = run.folder.path().display();
-            match ending {
-                Ending::Interrupted => {
-                    tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n"))
-                }
-                Ending::NotConverged => tell(&format!(
-                    "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json){}",
-                    failed.len(),
-                    frames_ok + failed.len(),
-                    more_about(failed.iter().map(|frame| frame.code.as_str()))
-                )),
-                Ending::Ok | Ending::Warned => {}
-            }
-            let status = match interrupted {
-                true => Status::interrupted(frames_ok, failed),
-                false => Status::finished(frames_ok, failed),
-            };
-            Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
-            if frames_ok > 0 {
-                write_page(&run.folder, flags)?;
-            }
-            Ok(ending)
+            tell(&format!("ended early: {frames} frames are finished and kept in {folder}\n"));
         }
-        Err(error) => {
-            Status::failed(0, Vec::new(), &error).write(&run.folder)?;
-            Err(error)
-        }
+    }
+    ended
+}
+
+/// Writes and says how the frames of a run ended.
+fn conclude(run: &Run, tally: Tally, flags: &Flags) -> Result<Ending> {
+    let Tally { frames_ok, failed, interrupted, warnings } = tally;
+    let ending = match failed.len() {
+        _ if interrupted => Ending::Interrupted,
+        0 if !warnings.is_empty() && flags.strict => Ending::Warned,
+        0 => Ending::Ok,
+        _ => Ending::NotConverged,
+    };
+    let folder = run.folder.path().display();
+    match ending {
+        Ending::Interrupted => tell(&format!("interrupted: {frames_ok} frames are finished and kept in {folder}\n")),
+        Ending::NotConverged => tell(&format!(
+            "not converged: {} of {} frames; what was found, and why, is in {folder} (status.json){}",
+            failed.len(),
+            frames_ok + failed.len(),
+            more_about(failed.iter().map(|frame| frame.code.as_str()))
+        )),
+        Ending::Ok | Ending::Warned => {}
+    }
+    let status = match interrupted {
+        true => Status::interrupted(frames_ok, failed),
+        false => Status::finished(frames_ok, failed),
+    };
+    Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
+    if frames_ok > 0 {
+        write_page(&run.folder, flags)?;
+    }
+    Ok(ending)
+}
+
+/// Says how a fit that did not come to its end goes on.
+fn tell_resume(ending: &Result<Ending>, folder: &Path) {
+    if let Ok(Ending::Interrupted) | Err(Error::Io { .. }) = ending {
+        tell(&format!("go on with: risorius resume {}\n", folder.display()));
     }
 }
 

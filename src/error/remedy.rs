@@ -1,6 +1,7 @@
 //! The remedy of every error: the edit or the command that mends it.
 
 use super::{Error, Likely};
+use std::io::ErrorKind;
 
 impl Error {
     /// The edit or command that mends it, where one is known.
@@ -194,7 +195,7 @@ impl Error {
             }
             Error::FactorTooLarge { .. } => Some("use a coarser mesh or a machine with more memory".into()),
             Error::NotFactored => None,
-            Error::Io { .. } => Some("check that the path exists and that you may use it".into()),
+            Error::Io { action, source, .. } => Some(io_help(action, source.kind()).into()),
             Error::FolderNotEmpty { .. } => {
                 Some("choose another --out, or add --force to replace the run that is in it".into())
             }
@@ -237,5 +238,19 @@ fn wrong_type_help(key: &str, expected: &str, found: &str) -> Option<String> {
         Some(format!("there is only one of it: write its header in single brackets, [{key}]"))
     } else {
         None
+    }
+}
+
+/// What to do about what the operating system refused.
+fn io_help(action: &str, kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "make room, or choose a place that has some with --out; what was complete before is complete still"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem if action != "read" => {
+            "choose a folder that you may write to, with --out or by changing to it"
+        }
+        ErrorKind::NotADirectory => "a part of this path is a file: choose another path",
+        _ => "check that the path exists and that you may use it",
     }
 }

@@ -96,6 +96,8 @@ struct Marker<'a> {
 /// A missing or not finite position becomes `null`. In millimetres every bit of a position comes back; in other units
 /// it may change by one rounding. Log and publish time are the stamp, or 0 for a stamp before 1970.
 ///
+/// A file that is there already is replaced whole or not at all.
+///
 /// Errors: M013 (a frame does not fit the labels), O001 (the file cannot be written).
 pub fn write_json(path: &Path, names: &[String], frames: &[Frame], options: &WriteOptions) -> Result<()> {
     let labels = names.len();
@@ -104,10 +106,12 @@ pub fn write_json(path: &Path, names: &[String], frames: &[Frame], options: &Wri
             return Err(Error::FrameShape { frame, positions, labels });
         }
     }
-    encode(names, frames, options).and_then(|bytes| std::fs::write(path, bytes)).map_err(|source| Error::Io {
-        action: "write",
-        path: path.into(),
-        source,
+    let beside = path.with_extension("mcap.part");
+    let written = encode(names, frames, options).and_then(|bytes| std::fs::write(&beside, bytes));
+    written.and_then(|()| std::fs::rename(&beside, path)).map_err(|source| {
+        // the first error is the one to tell
+        let _ = std::fs::remove_file(&beside);
+        Error::Io { action: "write", path: path.into(), source }
     })
 }
 

@@ -1,7 +1,9 @@
 //! The force-stretch law of muscle fibres (Blemker et al. 2005; Wu et al. 2013, Eqs. 6 to 8).
 //!
 //! With s = lambda / lambda_ofl the energy per reference volume is
-//!   W(lambda) = sigma_max (a G_act(s) + G_pas(s)),  dG/ds = f,
+//! ```text
+//! W(lambda) = sigma_max (a G_act(s) + G_pas(s)),  dG/ds = f,
+//! ```
 //! so that dW/dlambda = sigma_max f / lambda_ofl and the Cauchy stress along the fibre is
 //! sigma_max f lambda / lambda_ofl / J, which is Eq. 8.
 

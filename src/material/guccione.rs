@@ -1,14 +1,18 @@
 //! Transversely isotropic exponential solid (Guccione et al. 1995), in the form and with the names of Land et al. 2015.
 //!
 //! psi = c/2 (exp Q - 1),  Q = sum over a, b of B_ab E_ab^2,  E = (C - I)/2 in axes of which the first is the fibre,
-//!   B = [bf bfs bfs; bfs bt bt; bfs bt bt].
+//! ```text
+//! B = [bf bfs bfs; bfs bt bt; bfs bt bt].
+//! ```
 //!
 //! E is the whole strain, as published, not its isochoric part: split laws of fibres change their meaning where the
 //! volume changes a little. In an incompressible body both give the same stress, and only the pressure p differs.
 //!
 //! With R the rotation into the axes, F' = F R^T, and g = c exp Q:
-//!   S_ab   = g B_ab E_ab,   P' = F' S,   P = P' R
-//!   A'_iakc = d_ik S_ac + 2/g P'_ia P'_kc + g/2 (d_ac sum_b B_ab F'_ib F'_kb + B_ac F'_ic F'_ka)
+//! ```text
+//! S_ab   = g B_ab E_ab,   P' = F' S,   P = P' R
+//! A'_iakc = d_ik S_ac + 2/g P'_ia P'_kc + g/2 (d_ac sum_b B_ab F'_ib F'_kb + B_ac F'_ic F'_ka)
+//! ```
 
 use super::{Law, PAIRS, Response};
 use crate::math::lanes::{Lanes, MatrixLanes};

@@ -1,6 +1,6 @@
 //! Stress at a point. FAMILY of tissue laws, and the force-stretch law of muscle fibres.
 //!
-//! To add a tissue law: one file here with its energy and derivatives, and one line where the model is built; the
+//! To add a tissue law: one file here with its energy and derivatives, and a few lines elsewhere (`src/guide/adding.md`); the
 //! conformance tests of `tests/laws.rs` then run on it.
 
 pub mod fibre;

@@ -3,12 +3,14 @@
 //! psi = c1 (J^(-2/3) I1 - 3) + c2 (J^(-4/3) I2 - 3),  I1 = tr C,  I2 = (I1^2 - tr C^2)/2,  J = det F.
 //!
 //! With psi_1 = dpsi/dI1 and so on, and H = cof F:
-//!   dI1/dF = 2 F,  dI2/dF = 2 (I1 F - B F),  dJ/dF = H
-//!   d2I1 = 2 d_ik d_JL
-//!   d2I2 = 4 F_iJ F_kL + 2 I1 d_ik d_JL - 2 (d_ik C_JL + F_iL F_kJ + B_ik d_JL)
-//!   d2J  = e_ikm e_JLM F_mM
-//!   P = psi_1 dI1 + psi_2 dI2 + psi_J H
-//!   A = psi_1 d2I1 + psi_2 d2I2 + psi_J d2J + dJ (x) (psi_1J dI1 + psi_2J dI2) + transposed + psi_JJ H (x) H
+//! ```text
+//! dI1/dF = 2 F,  dI2/dF = 2 (I1 F - B F),  dJ/dF = H
+//! d2I1 = 2 d_ik d_JL
+//! d2I2 = 4 F_iJ F_kL + 2 I1 d_ik d_JL - 2 (d_ik C_JL + F_iL F_kJ + B_ik d_JL)
+//! d2J  = e_ikm e_JLM F_mM
+//! P = psi_1 dI1 + psi_2 dI2 + psi_J H
+//! A = psi_1 d2I1 + psi_2 d2I2 + psi_J d2J + dJ (x) (psi_1J dI1 + psi_2J dI2) + transposed + psi_JJ H (x) H
+//! ```
 
 use super::{Law, PAIRS, Response};
 use crate::math::lanes::{Lanes, MatrixLanes, cofactors, dot};

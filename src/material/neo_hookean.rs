@@ -3,8 +3,10 @@
 //! psi = mu/2 (J^(-2/3) I1 - 3),  I1 = tr C,  J = det F.
 //!
 //! With m = J^(-2/3), b = mu/2 m I1 and H = cof F = dJ/dF:
-//!   P = mu m F - 2/3 b/J H
-//!   A = mu m d_ik d_JL - 2/3 b/J d2J + M (x) H + H (x) M,   M = - 2/3 mu m/J F + 5/9 b/J^2 H
+//! ```text
+//! P = mu m F - 2/3 b/J H
+//! A = mu m d_ik d_JL - 2/3 b/J d2J + M (x) H + H (x) M,   M = - 2/3 mu m/J F + 5/9 b/J^2 H
+//! ```
 
 use super::mooney_rivlin::second_derivative_of_j;
 use super::{Law, PAIRS, Response};

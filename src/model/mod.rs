@@ -32,6 +32,7 @@ use crate::term::muscle::Muscle;
 use crate::term::pressure::PressureSpace;
 use crate::term::{ElementState, Term, Want};
 use assembly::{Parts, Plan};
+use rayon::prelude::*;
 use std::sync::Arc;
 use supports::Supports;
 
@@ -166,13 +167,11 @@ impl Model {
         if let Some(coupling) = self.terms()[term].as_coupling() {
             return self.with_body(state, term, |body| coupling.contact_points(body));
         }
-        let mut all = Vec::new();
-        if let Some(contact) = self.terms()[term].as_contact() {
-            for element in contact.elements() {
-                self.with_own(state, term, element, |at| all.extend(contact.points_at(at)));
-            }
-        }
-        all
+        let Some(contact) = self.terms()[term].as_contact() else { return Vec::new() };
+        let in_element = |element| self.with_own(state, term, element, |at| contact.points_at(at).collect());
+        let elements: Vec<usize> = contact.elements().collect();
+        let all: Vec<Vec<ContactPoint>> = elements.into_par_iter().map(in_element).collect();
+        all.concat()
     }
 
     /// Inputs in their order in [`State::controls`].

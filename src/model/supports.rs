@@ -3,6 +3,15 @@
 //! On a face xi_d = const the values and the in-plane derivatives of the tricubic Hermite basis depend only on the
 //! face's own parameters without a derivative along d. Prescribing these prescribes the whole face exactly and leaves
 //! the derivatives through it free.
+//!
+//! What is prescribed at a load factor l, with R(axis, angle) by the right-hand rule:
+//!
+//! ```text
+//! clamp     x = X,  or where a bone carries the face  x = c + s d + R(h) (X - c)
+//! symmetry  n . x = n . X
+//! plate     n . x = n . X + l offset
+//! rotate    x = c + R(axis, l angle) (X - c)
+//! ```
 
 use crate::math::tensor::{IDENTITY, Matrix, Vector, add_scaled, apply, cross, dot, normalised, rotation, subtract};
 use crate::mesh::Mesh;

@@ -4,6 +4,7 @@
 use crate::math::tensor::{Vector, add_scaled, norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Evaluation, Model, State};
+use crate::term::contact::ContactPoint;
 use crate::term::contact::law::Allows;
 
 /// A frame of a run.
@@ -195,9 +196,19 @@ pub fn bone_states<'m>(model: &'m Model, state: &State, evaluation: &Evaluation)
     model.bones().iter().map(bone_state).collect()
 }
 
+/// The quadrature points of all slidings and contacts of a model at a state, in the order of its terms.
+pub fn contact_points(model: &Model, state: &State) -> Vec<Vec<ContactPoint>> {
+    model.contacts().map(|(term, _)| model.contact_points(state, term)).collect()
+}
+
 /// All slidings and contacts of a model at a state, in the order of its terms.
 pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'m>> {
-    let contact_state = |(term, allows): (usize, Allows)| {
+    contact_sums(model, &contact_points(model, state))
+}
+
+/// The same from their points, which take longer to find than to add up.
+pub fn contact_sums<'m>(model: &'m Model, points: &[Vec<ContactPoint>]) -> Vec<ContactState<'m>> {
+    let contact_state = |((term, allows), points): ((usize, Allows), &Vec<ContactPoint>)| {
         let mut sum = ContactState {
             name: model.terms()[term].name(),
             area: 0.0,
@@ -206,7 +217,7 @@ pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'
             penetration: 0.0,
             force: [0.0; 3],
         };
-        for point in model.contact_points(state, term) {
+        for point in points {
             let gap = point.gap.unwrap_or(0.0);
             let wrong = if allows == Allows::Closed { gap.abs() } else { -gap };
             sum.penetration = sum.penetration.max(wrong);
@@ -224,5 +235,5 @@ pub fn contact_states<'m>(model: &'m Model, state: &State) -> Vec<ContactState<'
         sum.mean_pressure /= if sum.area > 0.0 { sum.area } else { 1.0 };
         sum
     };
-    model.contacts().map(contact_state).collect()
+    model.contacts().zip(points).map(contact_state).collect()
 }

@@ -35,7 +35,7 @@ pub mod vtu;
 
 pub use frame::{
     BoneState, ContactState, Frame, MarkerPair, MeshError, MuscleState, Outlier, Probe, ProbeState, bone_states,
-    contact_states, muscle_states, probe_states,
+    contact_points, contact_states, contact_sums, muscle_states, probe_states,
 };
 pub use manifest::{Input, Manifest};
 pub use record::Record;

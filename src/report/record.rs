@@ -1,7 +1,8 @@
 //! Everything that a run writes for each frame, in one place for all tasks.
 
 use super::frame::{
-    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_states, muscle_states, probe_states,
+    Frame, MarkerPair, MeshError, Outlier, Probe, bone_states, contact_points, contact_sums, muscle_states,
+    probe_states,
 };
 use super::run_folder::RunFolder;
 use super::tables::{
@@ -82,7 +83,7 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Writes a frame. `deviations`, `markers` and `iterations` of a fit are empty for a task that has none.
+    /// Writes a frame, all but its activations. `markers` and `iterations` of a fit are empty for a task that has none.
     ///
     /// # Errors
     /// Where a file cannot be written.
@@ -90,13 +91,12 @@ impl<'a> Record<'a> {
         &mut self,
         frame: Frame,
         equilibrium: &Equilibrium,
-        deviations: &[Option<f64>],
         markers: &[MarkerPair<'_>],
         iterations: &[FitIteration],
     ) -> Result<()> {
         let start = Instant::now();
         let state = &equilibrium.state;
-        self.activations.add(frame, &state.controls, deviations)?;
+        let contacts = contact_points(self.model, state);
         self.energies.add(frame, self.model, equilibrium)?;
         self.convergence.add(frame, &equilibrium.history)?;
         if let Some(table) = &mut self.muscles {
@@ -106,7 +106,7 @@ impl<'a> Record<'a> {
             table.add(frame, &bone_states(self.model, state, &equilibrium.evaluation))?;
         }
         if let Some(table) = &mut self.contacts {
-            table.add(frame, &contact_states(self.model, state))?;
+            table.add(frame, &contact_sums(self.model, &contacts))?;
         }
         if let Some((table, fit, ..)) = &mut self.fit {
             table.add(frame, markers)?;
@@ -116,11 +116,20 @@ impl<'a> Record<'a> {
             table.add(frame, state, &probe_states(self.probes, self.model, state))?;
         }
         if self.output.view && self.frames.is_multiple_of(self.output.every) {
-            self.view.add(frame, self.model, state, markers)?;
+            self.view.add(frame, self.model, state, markers, &contacts)?;
         }
         self.frames += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Writes the activations of a frame, the last of its rows: a frame that stands in `activations.csv` is complete, whatever
+    /// ended the run. `deviations` are empty for a task that has none.
+    ///
+    /// # Errors
+    /// Where the row cannot be written.
+    pub fn done(&mut self, frame: Frame, equilibrium: &Equilibrium, deviations: &[Option<f64>]) -> Result<()> {
+        self.activations.add(frame, &equilibrium.state.controls, deviations)
     }
 
     /// Writes what the markers of a frame tell; `names` are those of all controls and of all markers, `biases` one per control

@@ -2,15 +2,17 @@
 
 use crate::error::{Error, Result};
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Sub-folders of every run.
 const SUB_FOLDERS: [&str; 3] = ["tables", "view", "view/linear"];
 /// Sub-folders that a run fills and a later one in the same place replaces.
 const REPLACED: [&str; 3] = ["tables", "view", "state"];
-/// Files of a run that one of another task, or one that fails, would not replace.
-const REMOVED: [&str; 3] = ["report.html", "study.md", "fibres.exf"];
+/// Files of a run that one of another task, or one that fails, would not replace; the status, by which a run is known, goes last.
+const REMOVED: [&str; 6] = ["report.html", "study.md", "fibres.exf", "summary.txt", "manifest.json", "status.json"];
+/// What surely fits where a file of its length is already, bytes: a block of the disk.
+const BLOCK: usize = 4096;
 
 /// A folder that exists, holds the sub-folders of a run, and belongs to this run alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -124,6 +126,23 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<()> {
         let _ = fs::remove_file(&beside);
     }
     renamed
+}
+
+/// Writes over a file that is there, in its place: for a disk that has no room for a second one beside it. Not atomic, so that it is
+/// for short texts only; longer ones are refused.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_over(path: &Path, contents: &[u8]) -> Result<()> {
+    if contents.len() > BLOCK {
+        return Err(failed("write", path)(ErrorKind::StorageFull.into()));
+    }
+    let write = || {
+        let mut file = fs::OpenOptions::new().write(true).open(path)?;
+        file.write_all(contents)?;
+        file.set_len(contents.len() as u64)
+    };
+    write().map_err(failed("write", path))
 }
 
 /// An error of the operating system as one of ours.

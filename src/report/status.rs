@@ -1,6 +1,6 @@
 //! `status.json`: how a run stands or ended, for whoever asks while it goes on or afterwards.
 
-use super::run_folder::RunFolder;
+use super::run_folder::{RunFolder, write_over};
 use crate::error::{Error, Result, Warning};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -117,6 +117,20 @@ impl Status {
         }
     }
 
+    /// Writes that an error ended the run: its frames are those of the last `status.json`. On a full disk the file is written
+    /// over in its place; where even that fails it still says that the run goes on, as it does after a kill.
+    pub fn write_failed(run: &RunFolder, error: &Error) {
+        let before = Status::read(run.path()).unwrap_or_else(|| Status::running(0, Vec::new()));
+        let status =
+            Status { warnings: before.warnings, ..Status::failed(before.frames_ok, before.frames_failed, error) };
+        // the error that ended the run is the one to tell
+        if status.write(run).is_err()
+            && let Ok(text) = json(run, "status.json", &Status { warnings: Vec::new(), ..status })
+        {
+            let _ = write_over(&run.path().join("status.json"), text.as_bytes());
+        }
+    }
+
     /// Reads that of a run; `None` where there is none.
     pub fn read(run: &Path) -> Option<Status> {
         serde_json::from_slice(&std::fs::read(run.join("status.json")).ok()?).ok()
@@ -133,10 +147,14 @@ impl Status {
 
 /// Writes a value as indented JSON that ends with a newline, atomically.
 pub(in crate::report) fn write_json(run: &RunFolder, name: &str, value: &impl Serialize) -> Result<()> {
+    run.write(name, json(run, name, value)?)
+}
+
+fn json(run: &RunFolder, name: &str, value: &impl Serialize) -> Result<String> {
     let json = serde_json::to_string_pretty(value).map_err(|error| Error::Io {
         action: "write",
         path: run.path().join(name),
         source: error.into(),
     })?;
-    run.write(name, json + "\n")
+    Ok(json + "\n")
 }

@@ -7,6 +7,7 @@ use super::run_folder::RunFolder;
 use super::vtu::{Grid, bezier, contact, linear, markers, muscles};
 use crate::error::Result;
 use crate::model::{Model, State};
+use crate::term::contact::ContactPoint;
 use std::path::PathBuf;
 
 /// Writes shapes frame by frame.
@@ -42,25 +43,39 @@ impl View {
         }
     }
 
-    /// Adds a frame: the exact shape (also as an EX file), the resampled one, the muscles and contacts if the model has any,
-    /// the markers if there are any.
+    /// Adds a frame: the exact shape (also as an EX file), the resampled one, the muscles if the model has any, the markers and
+    /// the points of contacts if there are any. The files are made side by side: the solver waits for them.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
-    pub fn add(&mut self, frame: Frame, model: &Model, state: &State, markers: &[MarkerPair<'_>]) -> Result<()> {
-        self.shape.add(frame, &bezier::shape(model, state, frame.time_s))?;
-        self.linear.add(frame, &linear::shape(model, state, frame.time_s))?;
-        exf::write(&self.folder.join(format!("result_{:04}.exf", frame.index)), model, state)?;
-        if model.muscles().next().is_some() {
-            self.muscles.add(frame, &muscles::points(model, state, frame.time_s))?;
-        }
-        if model.contacts().next().is_some() {
-            self.contact.add(frame, &contact::points(model, state, frame.time_s))?;
-        }
-        if !markers.is_empty() {
-            self.markers.add(frame, &markers::points(markers, frame.time_s))?;
-        }
-        Ok(())
+    pub fn add(
+        &mut self,
+        frame: Frame,
+        model: &Model,
+        state: &State,
+        markers: &[MarkerPair<'_>],
+        contacts: &[Vec<ContactPoint>],
+    ) -> Result<()> {
+        let View { folder, shape, linear, muscles, contact, markers: shown } = self;
+        let time_s = frame.time_s;
+        let exf = || exf::write(&folder.join(format!("result_{:04}.exf", frame.index)), model, state);
+        let shape = || shape.add(frame, &bezier::shape(model, state, time_s));
+        let linear = || linear.add(frame, &linear::shape(model, state, time_s));
+        let points = || {
+            if model.muscles().next().is_some() {
+                muscles.add(frame, &muscles::points(model, state, time_s))?;
+            }
+            if !contacts.is_empty() {
+                contact.add(frame, &contact::points(contacts, time_s))?;
+            }
+            if !markers.is_empty() {
+                shown.add(frame, &markers::points(markers, time_s))?;
+            }
+            Ok(())
+        };
+        let ((exf, shape), (linear, points)) =
+            rayon::join(|| rayon::join(exf, shape), || rayon::join(linear, points));
+        exf.and(shape).and(linear).and(points)
     }
 
     /// Writes a state beside the frames, for example the iterate at which one failed, as `<name>.vtu`; returns its path.

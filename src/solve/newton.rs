@@ -2,7 +2,9 @@
 //! Problems, 2004, algorithm NLEQ-ERR).
 //!
 //! A step d = - K^-1 r(x) is damped by a factor f until the natural monotonicity test holds:
-//!   theta = |c| / |d| < 1 - f/4,   c = - K^-1 r(x + f d)
+//! ```text
+//! theta = |c| / |d| < 1 - f/4,   c = - K^-1 r(x + f d)
+//! ```
 //! c is the correction that the old tangent K sees at the trial. Unlike a test on |r| it does not depend on how the
 //! equations are scaled, and it lets a slender body turn through the large residuals that full steps meet. Where K serves
 //! well (theta small at f = 1) the corrections are taken too: steps without a factorisation.

@@ -1,8 +1,10 @@
 //! Bones that move: rigid bodies whose pose is a control of the model.
 //!
 //! A hinge turns a bone by the angle h about the axis a through c, then a slide shifts it by s along d, its hinge with it:
-//!   x = c + s d + R(h) (X - c)
-//!   dx/dh = a x (x - c - s d),  dx/ds = d,  d(R v)/dh = a x R v for a vector v of the bone
+//! ```text
+//! x = c + s d + R(h) (X - c)
+//! dx/dh = a x (x - c - s d),  dx/ds = d,  d(R v)/dh = a x R v for a vector v of the bone
+//! ```
 //! As controls h is in degrees and s in mm; both are 0 in the reference shape. What a bone carries moves with it: faces
 //! (a support), the surface of a contact, attachments.
 

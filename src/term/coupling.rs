@@ -1,4 +1,4 @@
-//! Terms that couple elements which need not share a node: faces that meet.
+//! Terms that couple elements which need not share a node: faces that meet, as in [`contact::mutual`](super::contact::mutual).
 //!
 //! What meets what changes with the state. A coupling therefore sees the whole body, and gives small systems, one for
 //! each pair of faces that meet at this state.

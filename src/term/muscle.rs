@@ -5,9 +5,11 @@
 //!
 //! A fibre acts along one direction. With g_a = dN_a/dX . n0 computed once, v = F n0 = sum x_a g_a, lambda = |v|,
 //! n = v / lambda, T = dW/dlambda:
-//!   dPi/du_a     = sum w T n g_a
-//!   d2Pi/du du   = sum w D g_a g_b,   D = T' n (x) n + T/lambda (I - n (x) n)
-//!   d2Pi/du da   = sum w (dT/da) n g_a
+//! ```text
+//! dPi/du_a     = sum w T n g_a
+//! d2Pi/du du   = sum w D g_a g_b,   D = T' n (x) n + T/lambda (I - n (x) n)
+//! d2Pi/du da   = sum w (dT/da) n g_a
+//! ```
 //!
 //! The activation is one control everywhere, or a field: a = sum over the muscle's nodes of psi_n a_n, trilinear in its
 //! elements, with a control a_n for every node; then d2Pi/du da_n has psi_n as a further factor.

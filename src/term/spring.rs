@@ -1,7 +1,9 @@
 //! Springs from material points to where they were at rest: a foundation under faces, or attachments of single points.
 //!
 //! Pi = sum over points 1/2 u . k u with a symmetric matrix k, so that
-//!   dPi/du_ia = sum k_ij u_j N_a,   d2Pi/du du = sum k_ij N_a N_b
+//! ```text
+//! dPi/du_ia = sum k_ij u_j N_a,   d2Pi/du du = sum k_ij N_a N_b
+//! ```
 //! Where a bone carries the other ends of attachments, u is the motion beyond that of the bone.
 
 use super::bone::{Bone, Carried, Wrench};

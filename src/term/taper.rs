@@ -4,7 +4,9 @@
 //! would have to jump with it, and a host with continuous strain comes near that only slowly. With a taper t the fibres
 //! of a cross-section end one after the other: where a fibre has the distance d to its nearer end, along its own
 //! direction, a part of them is left,
-//!   s(d / t) = 3 (d/t)^2 - 2 (d/t)^3  for d < t,  else 1,
+//! ```text
+//! s(d / t) = 3 (d/t)^2 - 2 (d/t)^3  for d < t,  else 1,
+//! ```
 //! by which the muscle's weights w are multiplied, and so its energy, force and stiffness. In a muscle shorter than 2 t
 //! the part never reaches one.
 

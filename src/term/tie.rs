@@ -1,8 +1,10 @@
 //! Rigid ties of material points to space or to a bone: sum N_a x_a = y(q), exactly.
 //!
 //! With multipliers l (mN), renewed by the outer loop, and the gap g = x - y:
-//!   Pi = sum over ties l . g + k/2 g . g
-//!   dPi/du_ia = (l + k g)_i N_a,  d2Pi/du_ia du_kb = k delta_ik N_a N_b
+//! ```text
+//! Pi = sum over ties l . g + k/2 g . g
+//! dPi/du_ia = (l + k g)_i N_a,  d2Pi/du_ia du_kb = k delta_ik N_a N_b
+//! ```
 //! Multipliers and not elimination: a point inside an element or a face hangs on all its parameters, and with one of
 //! them eliminated each of its neighbours would couple with each. So the tangent keeps its pattern, and stays definite.
 

@@ -41,6 +41,16 @@ def canvas(page):
     return page.locator("#viewer canvas").screenshot()
 
 
+def pictures_of_the_readme(page, run):
+    """The page down to the end of its viewer, and what the markers tell: problems/beam/report.png and told.png."""
+    viewer, told = page.locator("section", has=page.locator("#viewer")), page.locator("section#what-the-markers-can-and-cannot-tell")
+    if viewer.count() and told.count():
+        box = viewer.first.bounding_box()
+        whole = {"x": 0, "y": 0, "width": 1100, "height": box["y"] + box["height"]}
+        page.screenshot(path=out / f"{run.name}_report.png", full_page=True, clip=whole)
+        told.first.screenshot(path=out / f"{run.name}_told.png")
+
+
 def check(playwright, run):
     browser, page, requests, said = open_page(playwright, run, WEBGL)
     assert "not a diagnosis" in page.inner_text("body")
@@ -73,6 +83,7 @@ def check(playwright, run):
         page.locator("#viewer [name=skin]").check()
         (out / f"{run.name}_viewer.png").write_bytes(canvas(page))
     page.screenshot(path=out / f"{run.name}.png", full_page=True)
+    pictures_of_the_readme(page, run)
     page.pdf(path=out / f"{run.name}.pdf", format="A4", print_background=True)
     quiet(requests, said)
     browser.close()

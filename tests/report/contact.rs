@@ -4,9 +4,9 @@
 use crate::support::{FRAME, run_in, temporary};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::model::build::build;
-use risorius::report::contact_states;
 use risorius::report::tables::ContactTable;
 use risorius::report::vtu::{Values, contact};
+use risorius::report::{contact_points, contact_states};
 use risorius::scene::Scene;
 use std::path::Path;
 
@@ -57,7 +57,7 @@ fn tables_and_shapes_show_the_pressure() {
         assert!((number - expected).abs() < 1e-5 * (1.0 + expected), "{number} instead of {expected}");
     }
 
-    let grid = contact::points(model, &found.state, 0.0);
+    let grid = contact::points(&contact_points(model, &found.state), 0.0);
     assert_eq!(grid.points.len(), 4 * 25);
     let field = |name: &str| match &grid.on_points.iter().find(|f| f.name == name).expect("a field").values {
         Values::Scalars(values) => values.clone(),

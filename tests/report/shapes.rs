@@ -40,7 +40,7 @@ fn bezier_cells_are_the_elements_exactly() {
         let state = crumpled(&model);
         let folder = temporary();
         let run = run_in(&folder);
-        View::new(&run).add(FRAME, &model, &state, &[]).expect("written");
+        View::new(&run).add(FRAME, &model, &state, &[], &[]).expect("written");
         let vtu = Vtu::read(&run.view().join("result_0003.vtu"));
 
         assert!(vtu.head.contains("<VTKFile type=\"UnstructuredGrid\" version=\"2.2\" byte_order=\"LittleEndian\""));
@@ -95,7 +95,7 @@ fn linear_cells_sample_the_fields_and_fill_the_body() {
     let state = crumpled(&model);
     let folder = temporary();
     let run = run_in(&folder);
-    View::new(&run).add(FRAME, &model, &state, &[]).expect("written");
+    View::new(&run).add(FRAME, &model, &state, &[], &[]).expect("written");
     let vtu = Vtu::read(&run.view().join("linear/result_0003.vtu"));
     assert_eq!((vtu.points, vtu.cells), (27 * 6, 8 * 6));
     assert!(vtu.types().iter().all(|kind| *kind == 12));
@@ -141,7 +141,7 @@ fn muscle_points_carry_stretch_and_direction() {
     }
     let folder = temporary();
     let run = run_in(&folder);
-    View::new(&run).add(FRAME, &model, &state, &[]).expect("written");
+    View::new(&run).add(FRAME, &model, &state, &[], &[]).expect("written");
     let vtu = Vtu::read(&run.view().join("muscles_0003.vtu"));
     let (points, fibre) = (vtu.vectors("Points"), vtu.vectors("fibre"));
     let (stretch, activation, muscle) = (vtu.scalars("stretch"), vtu.scalars("activation"), vtu.integers("muscle"));
@@ -170,7 +170,7 @@ fn marker_points_and_lists_of_frames() {
     let mut view = View::new(&run);
     for index in 0..2 {
         let frame = Frame { index, time_s: 0.1 * index as f64 };
-        view.add(frame, &model, &model.rest(), &some_markers()).expect("written");
+        view.add(frame, &model, &model.rest(), &some_markers(), &[]).expect("written");
     }
     let vtu = Vtu::read(&run.view().join("markers_0001.vtu"));
     assert_eq!(vtu.integers("measured"), [0, 0, 0, 1, 1]);

@@ -93,13 +93,7 @@ fn glance(run: &Playback) -> String {
             continue;
         };
         let interval = control.intervals[at].map_or("-".into(), |[low, high]| format!("{low:.4} to {high:.4}"));
-        let name = format!("{} {}", control.name, control.kind.unit());
-        rows.push([
-            name.trim_end().to_owned(),
-            format!("{value:.4}"),
-            interval,
-            format!("{:.2} s", run.frames[at].time_s),
-        ]);
+        rows.push([control.label(), format!("{value:.4}"), interval, format!("{:.2} s", run.frames[at].time_s)]);
     }
     let mut html = table(["strongest", "value", "95 % interval", "at"], &rows);
     let distances: Vec<f64> =
@@ -137,8 +131,7 @@ fn activations(run: &Playback) -> String {
         done.extend([left.name.as_str(), right.name.as_str()]);
     }
     for control in run.controls.iter().filter(|control| !done.contains(&control.name.as_str())) {
-        let title = format!("{} {}", control.name, control.kind.unit());
-        html += &chart(title.trim_end().into(), vec![line("", control)], control);
+        html += &chart(control.label(), vec![line("", control)], control);
     }
     let band = if run.markers.is_empty() {
         ""

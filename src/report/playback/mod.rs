@@ -20,7 +20,7 @@ use crate::mesh::exf::ExFile;
 use crate::mesh::location::Locator;
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::model::build::host;
-use crate::scene::{Problem, Scene};
+use crate::scene::{Problem, Scene, Task};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -81,9 +81,16 @@ impl Playback {
         let activations =
             Sheet::find(&tables, "activations")?.ok_or_else(|| not_a_run(folder, "tables/activations.csv"))?;
         let frames = tracks::frames(&activations)?;
+        if frames.len() < status.frames_ok {
+            let message = format!("it has {} rows, status.json counts {} frames", frames.len(), status.frames_ok);
+            return Err(activations.damaged(message));
+        }
         let controls = tracks::controls(&activations, &scene, &tables)?;
         let markers =
             Sheet::find(&tables, "markers")?.map_or(Ok(Vec::new()), |sheet| tracks::markers(&sheet, &frames))?;
+        if scene.fit.is_some() && scene.task == Task::Fit && markers.is_empty() && !frames.is_empty() {
+            return Err(not_a_run(folder, "tables/markers.csv"));
+        }
         let convergence = Sheet::find(&tables, "convergence")?;
         let effort = convergence.map_or(Ok(Vec::new()), |sheet| tracks::effort(&sheet, &frames))?;
 
@@ -199,8 +206,12 @@ fn same_mesh(path: &Path, host: &Mesh) -> Result<()> {
 /// The field `deformed` of an EX file of a run on `host`.
 fn deformed(path: &Path, host: &Mesh) -> Result<Mesh> {
     let mesh = ExFile::read(path)?.geometry(Some("deformed"))?.mesh;
-    match mesh.elements() == host.elements() {
+    let damaged = |message: &str| Err(Error::DamagedRun { path: path.into(), message: message.into() });
+    if mesh.elements() != host.elements() {
+        return damaged(CHANGED);
+    }
+    match mesh.parameters.iter().flatten().all(|x| x.is_finite()) {
         true => Ok(mesh),
-        false => Err(Error::DamagedRun { path: path.into(), message: CHANGED.into() }),
+        false => damaged("a parameter of its shape is not a finite number"),
     }
 }

@@ -1,6 +1,7 @@
 //! A table of a run, read back.
 
 use crate::error::{Error, Result};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Cells by row, with the names of the columns.
@@ -12,15 +13,22 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// Reads `<folder>/<name>.csv`; `None` where there is no such table.
+    /// Reads `<folder>/<name>.csv`; `None` where there is no such table, or not even its header. A last row without its end
+    /// belongs to a frame that a kill cut short, and is left out.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::DamagedRun`] where a row is not as long as the header.
     pub fn find(folder: &Path, name: &str) -> Result<Option<Sheet>> {
         let path = folder.join(format!("{name}.csv"));
         match std::fs::read_to_string(&path) {
-            Ok(text) => Sheet::parse(path, &text).map(Some),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Ok(text) => {
+                let whole = text.rfind('\n').map_or(0, |end| end + 1);
+                if whole == 0 { Ok(None) } else { Sheet::parse(path, &text[..whole]).map(Some) }
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) if error.kind() == ErrorKind::InvalidData => {
+                Err(Error::DamagedRun { path, message: error.to_string().into() })
+            }
             Err(source) => Err(Error::Io { action: "read", path, source }),
         }
     }
@@ -64,10 +72,10 @@ impl Sheet {
     /// # Errors
     /// [`Error::DamagedRun`].
     pub fn column(&self, name: &str) -> Result<usize> {
-        self.columns.iter().position(|column| column == name).ok_or_else(|| Error::DamagedRun {
-            path: self.path.clone(),
-            message: format!("it has no column `{name}`").into(),
-        })
+        self.columns
+            .iter()
+            .position(|column| column == name)
+            .ok_or_else(|| self.damaged(format!("it has no column `{name}`")))
     }
 
     /// A cell.
@@ -87,12 +95,23 @@ impl Sheet {
         text.parse().map(Some).map_err(|_| self.bad(row, column))
     }
 
-    /// A cell that must hold a number.
+    /// A cell as a finite number; `None` where it is empty.
+    ///
+    /// # Errors
+    /// [`Error::DamagedRun`] where it is something else.
+    pub fn finite(&self, row: usize, column: usize) -> Result<Option<f64>> {
+        match self.number(row, column)? {
+            Some(number) if !number.is_finite() => Err(self.bad(row, column)),
+            number => Ok(number),
+        }
+    }
+
+    /// A cell that must hold a finite number.
     ///
     /// # Errors
     /// [`Error::DamagedRun`].
     pub fn known(&self, row: usize, column: usize) -> Result<f64> {
-        self.number(row, column)?.ok_or_else(|| self.bad(row, column))
+        self.finite(row, column)?.ok_or_else(|| self.bad(row, column))
     }
 
     /// A cell that counts something.
@@ -105,7 +124,11 @@ impl Sheet {
 
     fn bad(&self, row: usize, column: usize) -> Error {
         let (name, text) = (&self.columns[column], self.text(row, column));
-        let message = format!("row {}: `{text}` in column `{name}` is no number", row + 2).into();
-        Error::DamagedRun { path: self.path.clone(), message }
+        self.damaged(format!("row {}: `{text}` in column `{name}` is no number", row + 2))
+    }
+
+    /// That the table is not as a run wrote it.
+    pub(super) fn damaged(&self, message: String) -> Error {
+        Error::DamagedRun { path: self.path.clone(), message: message.into() }
     }
 }

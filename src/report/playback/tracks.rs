@@ -2,6 +2,7 @@
 
 use super::sheet::Sheet;
 use crate::error::Result;
+use crate::math::normal::TWO_SIDED_95;
 use crate::math::tensor::{Vector, norm, subtract};
 use crate::report::frame::Frame;
 use crate::scene::{ControlKind, ControlRange, Scene};
@@ -53,8 +54,12 @@ pub struct Effort {
     pub required_mn: f64,
 }
 
-/// Standard deviations from the middle to the ends of an interval that holds 95 %.
-const OF_95_PERCENT: f64 = 1.959964;
+impl Control {
+    /// Its name with its unit, if it has one: as tables of what the markers tell call it.
+    pub fn label(&self) -> String {
+        format!("{} {}", self.name, self.kind.unit()).trim_end().to_owned()
+    }
+}
 
 impl Sample {
     /// Distance between model and measurement, mm.
@@ -87,7 +92,7 @@ pub(super) fn controls(activations: &Sheet, scene: &Scene, tables: &Path) -> Res
         let mut intervals = vec![None; values.len()];
         if let Ok(column) = activations.column(&format!("{name}_sd")) {
             for (row, interval) in intervals.iter_mut().enumerate() {
-                let half = activations.number(row, column)?.map(|sd| OF_95_PERCENT * sd);
+                let half = activations.number(row, column)?.map(|sd| TWO_SIDED_95 * sd);
                 *interval =
                     half.map(|half| [values[row] - half, values[row] + half].map(|end| end.clamp(lower, upper)));
             }
@@ -107,7 +112,7 @@ fn refine(told: &Sheet, frames: &[Frame], controls: &mut [Control]) -> Result<()
     for row in 0..told.len() {
         let index = told.count(row, frame)?;
         let at = frames.iter().position(|known| known.index == index);
-        let control = controls.iter_mut().find(|control| control.name == told.text(row, name));
+        let control = controls.iter_mut().find(|control| control.label() == told.text(row, name));
         if let (Some(at), Some(control)) = (at, control) {
             let ends = told.number(row, lower)?.zip(told.number(row, upper)?);
             control.intervals[at] = ends.map(|(lower, upper)| [lower, upper]).or(control.intervals[at]);
@@ -124,14 +129,14 @@ pub(super) fn markers(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Marker>> {
     let mut markers: Vec<Marker> = Vec::new();
     for row in 0..sheet.len() {
         let index = sheet.count(row, frame)?;
-        // a run that was killed may have written the markers of a frame and not its activations
+        // activations come last: a run that was killed may have written the markers of a frame without them
         if !frames.iter().any(|known| known.index == index) {
             continue;
         }
         let [x, y, z] = model;
         let model = [sheet.known(row, x)?, sheet.known(row, y)?, sheet.known(row, z)?];
         let [x, y, z] = measured;
-        let measured = match (sheet.number(row, x)?, sheet.number(row, y)?, sheet.number(row, z)?) {
+        let measured = match (sheet.finite(row, x)?, sheet.finite(row, y)?, sheet.finite(row, z)?) {
             (Some(x), Some(y), Some(z)) => Some([x, y, z]),
             _ => None,
         };
@@ -142,9 +147,13 @@ pub(super) fn markers(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Marker>> {
         });
         markers[at].samples.push(Sample { model, measured });
     }
-    // a frame whose markers were not all written is none
-    markers.retain(|marker| marker.samples.len() == frames.len());
-    Ok(markers)
+    match markers.iter().find(|marker| marker.samples.len() != frames.len()) {
+        None => Ok(markers),
+        Some(marker) => {
+            let (name, rows) = (&marker.name, marker.samples.len());
+            Err(sheet.damaged(format!("marker `{name}` has {rows} rows for {} frames", frames.len())))
+        }
+    }
 }
 
 pub(super) fn effort(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Effort>> {
@@ -165,4 +174,28 @@ pub(super) fn effort(sheet: &Sheet, frames: &[Frame]) -> Result<Vec<Effort>> {
         own.required_mn = sheet.number(row, required)?.unwrap_or(f64::NAN);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tables of what the markers tell call the pose of a bone by its name and unit.
+    #[test]
+    fn intervals_of_bones_are_found() {
+        let text = "[task]\nkind = \"forward\"\n[mesh]\nblock = { origin_mm = [0, 0, 0], size_mm = [10, 10, 10], elements = [1, 1, 1] }\n\
+                    [tissue]\nneo-hookean = { mu_kpa = 1 }\n[[bone]]\nname = \"jaw\"\n\
+                    hinge = { axis = [0, 1, 0], through_mm = [0, 0, 0], bounds_deg = [0, 35] }\n\
+                    [[support]]\nclamp = { face = \"xi1=0\", bone = \"jaw\" }\n";
+        let scene = Scene::parse(text, "jaw.toml", Path::new("."), &[]).expect("a scene");
+        let sheet = |name: &str, text: &str| Sheet::parse(name.into(), text).expect("a table");
+        let activations = sheet("activations", "frame,time_s,jaw.hinge,jaw.hinge_sd\n4,0.1,3.0,1.0\n");
+        let mut found = controls(&activations, &scene, Path::new("nowhere")).expect("controls");
+        assert_eq!(found.len(), 1);
+        let [low, high] = found[0].intervals[0].expect("from the deviation");
+        assert!((low - 1.04).abs() < 1e-3 && (high - 4.96).abs() < 1e-3, "{low} {high}");
+        let told = sheet("told", "frame,control,lower_95,upper_95\n4,jaw.hinge deg,2.5,3.75\n5,jaw.hinge deg,0,1\n");
+        refine(&told, &frames(&activations).expect("frames"), &mut found).expect("refined");
+        assert_eq!(found[0].intervals, [Some([2.5, 3.75])]);
+    }
 }

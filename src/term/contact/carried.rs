@@ -1,9 +1,13 @@
 //! A surface on a bone: the gap is measured where the bone was at rest, and turned back.
 //!
 //! With X = R^T (x - c - s d) + c and the gap g0(X) of the surface at rest:
-//!   g(x) = g0(X),  dg/dx = n = R n0,  d2g/dx2 = H = R H0 R^T
+//! ```text
+//! g(x) = g0(X),  dg/dx = n = R n0,  d2g/dx2 = H = R H0 R^T
+//! ```
 //! A point of the surface moves with velocity v and turns with spin w per unit of a control q. At a fixed x
-//!   dg/dq = - n . v,  dn/dq = w x n - H v
+//! ```text
+//! dg/dq = - n . v,  dn/dq = w x n - H v
+//! ```
 
 use super::surface::{Gap, RigidSurface};
 use crate::math::tensor::{Vector, apply, dot, subtract};

@@ -1,8 +1,10 @@
 //! Contact of faces of the host with a rigid surface, without friction; with each other: [`mutual`].
 //!
 //! Pi = sum over points w psi(g(x)), with the reference area w of a point and the gap g of its current position:
-//!   dPi/du_ia       = sum w psi' n_i N_a
-//!   d2Pi/du_ia du_kb = sum w (psi'' n_i n_k + psi' d2g/dx_i dx_k) N_a N_b
+//! ```text
+//! dPi/du_ia       = sum w psi' n_i N_a
+//! d2Pi/du_ia du_kb = sum w (psi'' n_i n_k + psi' d2g/dx_i dx_k) N_a N_b
+//! ```
 //! A bone may carry the surface. Where the reference shape already penetrates and that is to be relaxed, g is measured from there and the load factor
 //! takes the difference away: g(x) - (1 - load) g(X).
 

@@ -3,9 +3,11 @@
 //! The foot y(s, t) of a point x of one face on the other makes |x - y| stationary; n is the outward normal there. With
 //! the functions N_a of the point and M_b of the foot, A_ia = (N_a, - M_b) is how the distance x - y follows the
 //! parameters, and
-//!   g = n . (x - y),   dg = n . A =: G
-//!   d2g = - a^T m^-1 k (m - g k)^-1 a - a^T (m - g k)^-1 b - b^T (m - g k)^-1 a - g b^T (m - g k)^-1 b
-//!   a_d = y_d . A,   b_d = n . M_d  (slopes of the functions of the foot),  metric m, curvature k along n
+//! ```text
+//! g = n . (x - y),   dg = n . A =: G
+//! d2g = - a^T m^-1 k (m - g k)^-1 a - a^T (m - g k)^-1 b - b^T (m - g k)^-1 a - g b^T (m - g k)^-1 b
+//! a_d = y_d . A,   b_d = n . M_d  (slopes of the functions of the foot),  metric m, curvature k along n
+//! ```
 //! which is the derivative through the moving foot (Wriggers 2006, Computational Contact Mechanics, sec. 6.1).
 //!
 //! Both faces are asked in turn, each for half of the energy, so that neither is preferred (two half passes, Sauer and De

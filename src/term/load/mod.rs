@@ -3,10 +3,10 @@
 //!
 //! Dead: Pi = - load f . u, so that dPi/du = - load f. To add one: a file here that computes f, and its line in the model.
 
-mod gravity;
-mod nodal_force;
-mod pressure;
-mod traction;
+pub mod gravity;
+pub mod nodal_force;
+pub mod pressure;
+pub mod traction;
 
 pub use gravity::{body_force, gravity};
 pub use nodal_force::nodal_force;

@@ -1,8 +1,10 @@
 //! Follower pressure: a force per current area that stays normal to the surface, f = - p n da.
 //!
 //! With the surface x(s, t) and da = x,s x x,t (outward):
-//!   r_ia     = load p sum w N_a da_i
-//!   K_ia,kb  = load p sum w N_a e_ikm (N_b,s x,t_m - N_b,t x,s_m)
+//! ```text
+//! r_ia     = load p sum w N_a da_i
+//! K_ia,kb  = load p sum w N_a e_ikm (N_b,s x,t_m - N_b,t x,s_m)
+//! ```
 //!
 //! Where the surface is closed, or its rim is held, this is the gradient of load p V with V the volume behind the surface,
 //! and K is symmetric after assembly (Bufler 1984). Where the rim is free there is no energy: K has an antisymmetric part,
@@ -10,7 +12,9 @@
 //! that; Newton's method comes to it a little more slowly, and sensitivities from the tangent are approximate.
 //!
 //! The work told is that of the pressure on the straight way from X to x = X + u,
-//!   W = - load p sum w u . (da(X) + 4 da(X + u/2) + da(x))/6,
+//! ```text
+//! W = - load p sum w u . (da(X) + 4 da(X + u/2) + da(x))/6,
+//! ```
 //! which is exact, for da is quadratic along it; the energy is its opposite. Both depend on the way at a free rim alone.
 
 use crate::material::PAIRS;

@@ -1,9 +1,15 @@
 //! FAMILY of pressure spaces: the functions psi_c of p = sum psi_c p_c in each element.
 //!
+//! Both there are have the trilinear functions of the corners c, which have the places e_c = 0 or 1 along each direction:
+//!
+//! ```text
+//! psi_c(xi) = product over d of (e_cd xi_d + (1 - e_cd) (1 - xi_d))
+//! ```
+//!
 //! To add one: a file here, and its line in [`PRESSURE_SPACES`].
 
-mod discontinuous_trilinear;
-mod trilinear;
+pub mod discontinuous_trilinear;
+pub mod trilinear;
 
 pub use discontinuous_trilinear::DiscontinuousTrilinear;
 pub use trilinear::Trilinear;

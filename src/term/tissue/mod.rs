@@ -4,10 +4,12 @@
 //! Pi = sum over points w [ psi(F) - p (J - 1) + U(J) ],  U(J) = kappa/4 (J^2 - 1 - 2 ln J)
 //!
 //! With H = cof F = dJ/dF, a function N_a of the displacement and psi_c of the pressure:
-//!   dPi/du_ia     = sum w (P + (U' - p) H)_iJ N_a,J
-//!   dPi/dp_c      = - sum w psi_c (J - 1)
-//!   d2Pi/du du    = sum w N_a,J [A + (U' - p) d2J + U'' H (x) H]_iJkL N_b,L
-//!   d2Pi/du dp    = - sum w psi_c H_iJ N_a,J
+//! ```text
+//! dPi/du_ia     = sum w (P + (U' - p) H)_iJ N_a,J
+//! dPi/dp_c      = - sum w psi_c (J - 1)
+//! d2Pi/du du    = sum w N_a,J [A + (U' - p) d2J + U'' H (x) H]_iJkL N_b,L
+//! d2Pi/du dp    = - sum w psi_c H_iJ N_a,J
+//! ```
 //! Derivatives by X are pulled back to xi at the points, so that the sums run over the tensor-product basis.
 
 mod kernel;

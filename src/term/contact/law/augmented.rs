@@ -1,4 +1,8 @@
 //! Augmented Lagrangian: a penalty about a multiplier, renewed until the gap is closed (Alart and Curnier 1991).
+//!
+//! ```text
+//! psi = l g + k/2 g^2 where l + k g < 0,  else - l^2 / 2k;  of a sliding, which may not open, the former;  then l := psi'
+//! ```
 
 use super::{Allows, ContactLaw, Response};
 

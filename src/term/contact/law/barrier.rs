@@ -1,5 +1,9 @@
 //! Barrier: grows without bound as the gap closes, so that nothing ever penetrates (Li et al. 2020, Incremental Potential
 //! Contact). C2; the gap that it leaves is a part of its range.
+//!
+//! ```text
+//! psi = - k (g - r)^2 ln(g / r) for 0 < g < r,  0 beyond the range r
+//! ```
 
 use super::{Allows, ContactLaw, Response};
 

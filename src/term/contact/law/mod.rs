@@ -1,12 +1,12 @@
 //! FAMILY of contact laws: the energy per reference area that keeps a gap closed, or open.
 //!
-//! psi(g) has the slope psi' = - pressure (kPa) and the curvature psi'' >= 0 (kPa/mm). To add a law: one file here, its line
-//! in the scene, and its case in the conformance tests.
+//! psi(g) has the slope psi' = - pressure (kPa) and the curvature psi'' >= 0 (kPa/mm). How to add a law:
+//! `src/guide/adding.md`.
 
-mod augmented;
-mod barrier;
-mod penalty;
-mod smooth;
+pub mod augmented;
+pub mod barrier;
+pub mod penalty;
+pub mod smooth;
 
 pub use augmented::Augmented;
 pub use barrier::Barrier;

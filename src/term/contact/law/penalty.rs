@@ -1,4 +1,8 @@
 //! Penalty: a spring per area. C1; the gap that it leaves is pressure / stiffness.
+//!
+//! ```text
+//! psi = k/2 g^2 for g < 0,  else 0;  of a sliding, which may not open, for every g
+//! ```
 
 use super::{Allows, ContactLaw, Response};
 

@@ -1,10 +1,13 @@
 //! Smooth penalty: a spring per area that sets in over a range, so that Newton's method sees no kink where points open and
-//! close. C2; the gap that it leaves is at most pressure / stiffness + half of the range.
+//! close. C2; the gap that it leaves is at most pressure / stiffness + half of the range. With the depth d = -g and the range r:
+//!
+//! ```text
+//! psi = k d^3 / (6 r) for 0 < d < r,  k/2 (d - r/2)^2 + k r^2 / 24 beyond,  0 for d < 0
+//! ```
 
 use super::{Allows, ContactLaw, Response};
 
-/// With the depth d = -g and the range r:
-///   psi = k d^3 / (6 r) for 0 < d < r,   k/2 (d - r/2)^2 + k r^2 / 24 beyond,   zero for d < 0
+/// psi of the stiffness k and the range r.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Smooth {
     /// k, kPa/mm.

@@ -1,7 +1,9 @@
 //! A smooth surface behind a set of faces: teeth and jaws behind the lips, whose own deep surface is uneven.
 //!
 //! A single bicubic patch, a graph z(x, y) that is even in x: with s from 0 to 1 over x from -half to half and t over y,
-//!   z(s, t) = sum c_kl [B_k(s) + B_3-k(s)] B_l(t),  k = 0, 1,  l = 0 .. 3, in Bernstein polynomials B,
+//! ```text
+//! z(s, t) = sum c_kl [B_k(s) + B_3-k(s)] B_l(t),  k = 0, 1,  l = 0 .. 3, in Bernstein polynomials B,
+//! ```
 //! by least squares through points of the faces, then moved back until no point lies behind it.
 
 use super::{Gap, Patches, RigidSurface};

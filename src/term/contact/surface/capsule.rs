@@ -1,4 +1,11 @@
-//! A capsule: a cylinder with half spheres as its ends, solid or hollow.
+//! A capsule: a cylinder with half spheres as its ends, solid (s = 1) or hollow (s = -1).
+//!
+//! With the foot y on the segment between the ends and its unit vector a:
+//!
+//! ```text
+//! g = s (|x - y| - r),  dg/dx = n = s (x - y) / |x - y|
+//! d2g/dx2 = s (Q - n (x) n) / |x - y|,  Q = I - a (x) a beside the segment, I beyond its ends
+//! ```
 
 use super::{FreeSide, Gap, RigidSurface, across, around};
 use crate::math::tensor::{IDENTITY, Vector, add_scaled, dot, norm, subtract};

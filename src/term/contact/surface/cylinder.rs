@@ -1,4 +1,8 @@
-//! A cylinder without ends, solid or hollow.
+//! A cylinder without ends about the line through c along the unit vector a, with the radius r, solid (s = 1) or hollow (s = -1).
+//!
+//! ```text
+//! y = c + a (a . (x - c)),  g = s (|x - y| - r),  dg/dx = n = s (x - y) / |x - y|,  d2g/dx2 = s (I - a (x) a - n (x) n) / |x - y|
+//! ```
 
 use super::{FreeSide, Gap, RigidSurface, across, around};
 use crate::math::tensor::{Vector, add_scaled, dot, subtract};

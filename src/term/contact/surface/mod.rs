@@ -1,14 +1,14 @@
 //! FAMILY of rigid surfaces: the signed distance of a point, with its exact first and second derivatives.
 //!
 //! g(x) > 0 on the free side. dg/dx = n is the unit normal towards the free side, d2g/dx2 its curvature; n . d2g/dx2 = 0.
-//! To add a surface: one file here, its line in the scene, and its case in the conformance tests.
+//! To add a surface: one file here, its line in the scene, and its case in the conformance tests (`src/guide/adding.md`).
 
-mod arch;
-mod capsule;
-mod cylinder;
-mod patches;
-mod plane;
-mod sphere;
+pub mod arch;
+pub mod capsule;
+pub mod cylinder;
+pub mod patches;
+pub mod plane;
+pub mod sphere;
 
 pub use arch::Arch;
 pub use capsule::Capsule;

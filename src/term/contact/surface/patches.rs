@@ -2,7 +2,9 @@
 //!
 //! The foot of x on a patch y(s, t) makes |y - x| stationary: y_a . (y - x) = 0. With the metric m_ab = y_a . y_b and the
 //! curvature k_ab = n . y_ab of the surface along its normal n,
-//!   g = n . (x - y),  dg/dx = n,  d2g/dx2 = - A m^-1 k (m - g k)^-1 A^T,  A = [y_s y_t]
+//! ```text
+//! g = n . (x - y),  dg/dx = n,  d2g/dx2 = - A m^-1 k (m - g k)^-1 A^T,  A = [y_s y_t]
+//! ```
 //! Where the set has an edge, the patches go on beyond it by one element as the polynomials that they are; further
 //! out there is no surface.
 

@@ -1,4 +1,8 @@
-//! A plane.
+//! A plane through c with the unit normal n towards the free side.
+//!
+//! ```text
+//! g = n . (x - c),  dg/dx = n,  d2g/dx2 = 0
+//! ```
 
 use super::{Gap, RigidSurface};
 use crate::math::tensor::{Vector, dot, subtract};

@@ -1,4 +1,8 @@
-//! A sphere, solid or hollow.
+//! A sphere about c with the radius r, solid (s = 1) or hollow (s = -1).
+//!
+//! ```text
+//! g = s (|x - c| - r),  dg/dx = n = s (x - c) / |x - c|,  d2g/dx2 = s (I - n (x) n) / |x - c|
+//! ```
 
 use super::{FreeSide, Gap, RigidSurface, around};
 use crate::math::tensor::{IDENTITY, Vector};
