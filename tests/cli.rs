@@ -579,3 +579,25 @@ fn what_has_no_estimate_runs_with_a_warning() {
     let page = stdout(&folder, &["run", "-q", "exf.toml", "--estimate", "--out", "exf"], 0);
     assert!(page.contains("tip") && !page.contains("estimated"), "{page}");
 }
+
+/// Every template but the face (which has a test of its own) is checked without a warning; those that take a second are run.
+#[test]
+fn every_template_is_a_problem() {
+    let folder = folder();
+    for (name, words) in [
+        ("forward", "forward: forward; "),
+        ("fit", "40 of 40 frames used"),
+        ("fibres", "axes and"),
+        ("study", "64 variants"),
+    ] {
+        let page = stdout(&folder, &["new", name, "--template", name], 0);
+        assert!(page.contains(&format!("next: risorius check {name}/problem.toml")), "{page}");
+        let problem = format!("{name}/problem.toml");
+        let page = stdout(&folder, &["check", "--strict", &problem], 0);
+        assert!(page.contains(words), "`{words}` is not in\n{page}");
+        let again = stderr(&folder, &["new", name, "--template", name], 6);
+        assert!(again.contains("error[O001]") && again.contains("it is there already"), "{again}");
+    }
+    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", THREE_FRAMES[0], THREE_FRAMES[1]], 0);
+    stdout(&folder, &["run", "-q", "fibres/problem.toml", "--out", "b"], 0);
+}
