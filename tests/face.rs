@@ -171,13 +171,22 @@ fn every_named_face_is_where_its_name_says() {
     assert_eq!((count("lip.upper"), count("lip.lower"), count("lid.upper.L"), count("lid.lower.R")), (6, 6, 4, 4));
     let parts = ["deep.perioral", "deep.nose", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
     assert_eq!(parts.iter().sum::<usize>(), 560, "{parts:?}");
-    // the lips touch: both margins are the same surface, and the corner of the mouth is where its landmark is
-    for (upper, lower) in whole.named_faces["lip.upper"].iter().zip(&whole.named_faces["lip.lower"]) {
-        for [s, w] in [[0.0, 0.0], [0.3, 0.6], [1.0, 1.0]] {
-            let x = whole.position(MaterialPoint { element: upper.element, xi: [s, 0.0, w] });
-            close(whole.position(MaterialPoint { element: lower.element, xi: [s, 1.0, w] }), x, 1e-9, "lips");
-        }
+    // the margins of the lips are round: one above the other, 0.2 mm apart where they are nearest, which is within their
+    // thickness, 4.4 mm at the back and 1.6 mm at the skin; at the corners they meet
+    let (upper, lower) = (&whole.named_faces["lip.upper"], &whole.named_faces["lip.lower"]);
+    let gap = |k: usize, s: f64, w: f64| {
+        let above = whole.position(MaterialPoint { element: upper[k].element, xi: [s, 0.0, w] });
+        let [x, y, z] = subtract(above, whole.position(MaterialPoint { element: lower[k].element, xi: [s, 1.0, w] }));
+        assert!(x.abs() < 1e-9 && y > -1e-9 && z.abs() < 1e-9, "{x} {y} {z}");
+        y
+    };
+    let middle: Vec<f64> = (0..=100).map(|k| gap(3, 0.0, k as f64 / 100.0)).collect();
+    let nearest = middle.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!((0.2..0.201).contains(&nearest) && (middle[0] - 4.4).abs() < 1e-9 && (middle[100] - 1.6).abs() < 1e-9);
+    for k in 0..6 {
+        assert!(gap(k, 0.5, 0.0) > 0.1 && (0..=10).all(|w| gap(k, 0.5, 0.1 * w as f64) > 0.0));
     }
+    assert!(gap(0, 0.0, 0.0) < 1e-9 && gap(5, 1.0, 0.4) < 1e-9);
     let ends = |name: &str, s: f64| {
         let faces = &whole.named_faces[name];
         let element = if s == 1.0 { faces[faces.len() - 1].element } else { faces[0].element };

@@ -61,6 +61,21 @@ def eyes():
             yield actor(ball, colour)
 
 
+def mouth():
+    """The dark behind the lips, which is no part of the model."""
+    ball = vtk.vtkSphereSource()
+    ball.SetRadius(1.0)
+    ball.SetThetaResolution(48)
+    ball.SetPhiResolution(48)
+    shape = vtk.vtkTransform()
+    shape.Translate(0, -35, 84)
+    shape.Scale(26, 12, 17)
+    shaped = vtk.vtkTransformPolyDataFilter()
+    shaped.SetInputConnection(ball.GetOutputPort())
+    shaped.SetTransform(shape)
+    return actor(shaped, (0.24, 0.08, 0.08))
+
+
 def fibres(path):
     lines = vtk.vtkAppendPolyData()
     for row in csv.DictReader(open(path)):

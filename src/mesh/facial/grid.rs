@@ -45,6 +45,10 @@ const LIDS: [f64; 2] = [4.9, 3.9];
 const EYE_SLOPE: f64 = 0.25;
 /// How far the margins of the lips roll in, mm, and over how many rows.
 const ROLL: (f64, f64) = (1.0, 1.2);
+/// How far the edges of the margins of the lips at the back and at the skin are from the line where the margins meet, mm.
+const ROUND: [f64; 2] = [2.2, 0.8];
+/// How far the margins are from that line where they are nearest, mm.
+const APART: f64 = 0.1;
 
 /// A function of s and t: value, by s, by t, by both.
 #[derive(Debug, Clone, Copy, Default)]
@@ -56,7 +60,7 @@ pub(super) struct Jet {
 }
 
 /// A function of one coordinate: value and slope.
-type Line = [f64; 2];
+pub(super) type Line = [f64; 2];
 
 impl Jet {
     fn add(&mut self, other: Jet) {
@@ -159,4 +163,19 @@ pub(super) fn roll(s: f64, t: f64, side: Side) -> Jet {
     let sign = if above { 1.0 } else { -1.0 };
     let d = (1.0 - sign * (t - mouth) / rows).max(0.0);
     product(depth, bump(s, 0.0, MOUTH_END as f64, 1.5), [d * d * d, -3.0 * d * d * sign / rows])
+}
+
+/// How far the margin of a lip is from the line where they meet at the depth w, 0 at the back and 1 at the skin, mm; with its slope. A
+/// parabola through [`ROUND`] whose least value is [`APART`]: the margins are round and meet within their thickness.
+pub(super) fn margin(w: f64) -> Line {
+    let [back, skin] = ROUND.map(|edge| (edge - APART).sqrt());
+    let root = back - (back + skin) * w;
+    [APART + root * root, -2.0 * root * (back + skin)]
+}
+
+/// How much of [`margin`] there is, up or down.
+pub(super) fn round(s: f64, t: f64, side: Side) -> Jet {
+    let mouth = MOUTH_ROW as f64;
+    let above = if t == mouth { side == Side::Above } else { t > mouth };
+    product(if above { 1.0 } else { -1.0 }, bump(s, 0.0, MOUTH_END as f64, 1.5), around(t, mouth, 1.0))
 }

@@ -42,11 +42,13 @@ pub const FACES: [&str; 15] = [
 /// A node of a surface: X, by s, by t, by both, mm.
 type Node = [Vector; 4];
 
-/// The skin and the way from the deep surface to it.
+/// The skin, the way from the deep surface to it, and how far both are from the middle of the thickness because the tissue is
+/// round there: X = skin - (1 - w) way + margin(w) round, w from 0 deep to 1 at the skin.
 #[derive(Debug, Clone, Copy)]
 struct Pair {
     skin: Node,
     way: Node,
+    round: Node,
 }
 
 /// All rows of nodes as seen from above and from below; they differ inside slits.
@@ -81,7 +83,20 @@ fn pair(sheet: &Sheet, s: usize, t: usize, side: Side) -> Pair {
         skin[k][2] -= by;
         way[k][2] -= by;
     }
-    Pair { skin, way }
+    let round = grid::round(s, t, side);
+    let round = [round.value, round.s, round.t, round.st].map(|up| [0.0, up, 0.0]);
+    Pair { skin, way, round }
+}
+
+impl Pair {
+    /// X and its derivative by w, with those by s, t and both.
+    fn at(&self, w: f64) -> (Node, Node) {
+        let of = |k: usize, skin: f64, way: f64, round: f64| -> Vector {
+            std::array::from_fn(|i| skin * self.skin[k][i] + way * self.way[k][i] + round * self.round[k][i])
+        };
+        let [value, slope] = grid::margin(w);
+        (std::array::from_fn(|k| of(k, 1.0, w - 1.0, value)), std::array::from_fn(|k| of(k, 0.0, 1.0, slope)))
+    }
 }
 
 /// The node on the other half.
@@ -94,7 +109,7 @@ impl Rows {
     fn new(sheet: &Sheet, half: bool) -> Rows {
         let row = |t: usize, side: Side| {
             let left: Vec<Pair> = (0..=COLUMNS).map(|s| pair(sheet, s, t, side)).collect();
-            let right = left.iter().skip(1).rev().map(|p| Pair { skin: mirrored(p.skin), way: mirrored(p.way) });
+            let right = left.iter().skip(1).rev().map(|p| map(*p, mirrored));
             if half { left } else { right.chain(left.iter().copied()).collect() }
         };
         Rows {
@@ -135,7 +150,7 @@ impl Rows {
 }
 
 fn map(pair: Pair, change: impl Fn(Node) -> Node) -> Pair {
-    Pair { skin: change(pair.skin), way: change(pair.way) }
+    Pair { skin: change(pair.skin), way: change(pair.way), round: change(pair.round) }
 }
 
 /// The node halfway between two: `line` and `other` are each a parameter and its derivative along the line between them.
@@ -152,7 +167,7 @@ fn between(a: Pair, b: Pair, line: [usize; 2], other: [usize; 2]) -> Pair {
         }
         middle
     };
-    Pair { skin: node(a.skin, b.skin), way: node(a.way, b.way) }
+    Pair { skin: node(a.skin, b.skin), way: node(a.way, b.way), round: node(a.round, b.round) }
 }
 
 /// Which nodes of row `t` are double, in columns from the midline; `fine` is 2 on a halved grid.
@@ -184,14 +199,11 @@ pub fn host(sheet: &Sheet, options: Options) -> Mesh {
                         number.insert((k, t, s, true), number[&(k, t, s, false)]);
                         continue;
                     }
-                    let Pair { skin, way } = if above { rows.above[t][s] } else { rows.below[t][s] };
+                    let pair = if above { rows.above[t][s] } else { rows.below[t][s] };
                     number.insert((k, t, s, above), parameters.len() / 8);
-                    for n in 0..4 {
-                        parameters.push(std::array::from_fn(|i| skin[n][i] - (1.0 - w) * way[n][i]));
-                    }
-                    for n in 0..4 {
-                        parameters.push(way[n].map(|x| x / layers as f64));
-                    }
+                    let (place, by_w) = pair.at(w);
+                    parameters.extend(place);
+                    parameters.extend(by_w.map(|x| x.map(|x| x / layers as f64)));
                 }
             }
         }
