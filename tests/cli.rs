@@ -159,7 +159,8 @@ fn without_arguments_the_built_in_face_is_fitted() {
     assert_eq!(json(&folder, "runs/face-0001/status.json")["frames_ok"], 1);
     assert_eq!(json(&folder, "runs/face-0001/manifest.json")["threads"], 1);
     let activations = text(&folder, "runs/face-0001/tables/activations.csv");
-    let row: Vec<f64> = activations.lines().nth(1).unwrap().split(',').skip(2).take(30).map(|a| a.parse().unwrap()).collect();
+    let row: Vec<f64> =
+        activations.lines().nth(1).unwrap().split(',').skip(2).take(30).map(|a| a.parse().unwrap()).collect();
     assert!(row.len() == 30 && row.iter().all(|a| (0.0..=0.01).contains(a)), "it is at rest: {activations}");
     // its lock file names the copy of the recording
     let page = stdout(&folder, &["check", "runs/face-0001/problem.lock.toml"], 0);
@@ -597,4 +598,26 @@ fn what_has_no_estimate_runs_with_a_warning() {
     assert!(said.contains("S013") && said.contains("elements of an EX file cannot be halved"), "{said}");
     let page = stdout(&folder, &["run", "-q", "exf.toml", "--estimate", "--out", "exf"], 0);
     assert!(page.contains("tip") && !page.contains("estimated"), "{page}");
+}
+
+/// Every template but the face (which has a test of its own) is checked without a warning; those that take a second are run.
+#[test]
+fn every_template_is_a_problem() {
+    let folder = folder();
+    for (name, words) in [
+        ("forward", "forward: forward; "),
+        ("fit", "40 of 40 frames used"),
+        ("fibres", "axes and"),
+        ("study", "64 variants"),
+    ] {
+        let page = stdout(&folder, &["new", name, "--template", name], 0);
+        assert!(page.contains(&format!("next: risorius check {name}/problem.toml")), "{page}");
+        let problem = format!("{name}/problem.toml");
+        let page = stdout(&folder, &["check", "--strict", &problem], 0);
+        assert!(page.contains(words), "`{words}` is not in\n{page}");
+        let again = stderr(&folder, &["new", name, "--template", name], 6);
+        assert!(again.contains("error[O001]") && again.contains("it is there already"), "{again}");
+    }
+    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", THREE_FRAMES[0], THREE_FRAMES[1]], 0);
+    stdout(&folder, &["run", "-q", "fibres/problem.toml", "--out", "b"], 0);
 }

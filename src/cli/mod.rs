@@ -202,6 +202,14 @@ struct Flags {
 enum Template {
     /// The face with its fifteen pairs of muscles
     Face,
+    /// A muscle in a block of tissue: shapes for given activations
+    Forward,
+    /// A beam with two muscles, and a recording of its markers
+    Fit,
+    /// A fan-shaped muscle, and measured directions of its fibres
+    Fibres,
+    /// A bent beam solved in 64 ways: errors against seconds
+    Study,
 }
 
 /// What further markers are chosen for.

@@ -8,14 +8,35 @@ use std::fs;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
-/// The problem of the template `face`.
-const FACE_PROBLEM: &str = include_str!("../../data/face/problem.toml");
+/// A file of a template.
+type File = (&'static str, Vec<u8>);
 
 impl Template {
-    /// The files of a template.
-    fn files(self) -> &'static [(&'static str, &'static str)] {
+    /// The files of a template: problems of `problems/`, with what they name beside them.
+    fn files(self) -> Vec<File> {
+        let problem = |text: &str| ("problem.toml", text.as_bytes().to_vec());
         match self {
-            Template::Face => &[("problem.toml", FACE_PROBLEM), ("face.toml", FACE)],
+            Template::Face => {
+                vec![problem(include_str!("../../data/face/problem.toml")), ("face.toml", FACE.as_bytes().to_vec())]
+            }
+            Template::Forward => vec![problem(include_str!("../../problems/slab/problem.toml"))],
+            Template::Fit => vec![
+                problem(
+                    &include_str!("../../problems/beam/problem.toml")
+                        .replace("../../data/beam.mcap", "recording.mcap"),
+                ),
+                ("recording.mcap", include_bytes!("../../data/beam.mcap").to_vec()),
+            ],
+            Template::Fibres => vec![
+                problem(include_str!("../../problems/fibres/problem.toml")),
+                ("axes.csv", include_bytes!("../../problems/fibres/axes.csv").to_vec()),
+                ("traces.csv", include_bytes!("../../problems/fibres/traces.csv").to_vec()),
+            ],
+            Template::Study => {
+                let study = include_str!("../../problems/bending_study/problem.toml");
+                let bending = include_bytes!("../../problems/bending/problem.toml").to_vec();
+                vec![problem(&study.replace("../bending/problem.toml", "bending.toml")), ("bending.toml", bending)]
+            }
         }
     }
 }
@@ -24,16 +45,15 @@ impl Template {
 pub(super) fn new(folder: &Path, template: Template) -> Result<Ending> {
     let io = |action, path: &Path, source| Error::Io { action, path: path.into(), source };
     fs::create_dir_all(folder).map_err(|source| io("make", folder, source))?;
-    let paths = template.files().iter().map(|(name, text)| (folder.join(name), *text));
-    let paths: Vec<_> = paths.collect();
+    let paths: Vec<_> = template.files().into_iter().map(|(name, bytes)| (folder.join(name), bytes)).collect();
     // nothing is written if anything is in the way
     if let Some((path, _)) = paths.iter().find(|(path, _)| path.exists()) {
         let source = std::io::Error::new(ErrorKind::AlreadyExists, "it is there already; choose another folder");
         return Err(io("write", path, source));
     }
-    for (number, (path, text)) in paths.iter().enumerate() {
+    for (number, (path, bytes)) in paths.iter().enumerate() {
         let file = fs::OpenOptions::new().write(true).create_new(true).open(path);
-        file.and_then(|mut file| file.write_all(text.as_bytes())).map_err(|source| {
+        file.and_then(|mut file| file.write_all(bytes)).map_err(|source| {
             // all or nothing, so that it can be tried again; the first error is the one to tell
             let made = number + usize::from(source.kind() != ErrorKind::AlreadyExists);
             paths[..made].iter().for_each(|(path, _)| drop(fs::remove_file(path)));

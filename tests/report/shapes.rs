@@ -145,6 +145,8 @@ fn muscle_points_carry_stretch_and_direction() {
     let vtu = Vtu::read(&run.view().join("muscles_0003.vtu"));
     let (points, fibre) = (vtu.vectors("Points"), vtu.vectors("fibre"));
     let (stretch, activation, muscle) = (vtu.scalars("stretch"), vtu.scalars("activation"), vtu.integers("muscle"));
+    let tension = vtu.scalars("tension_kpa");
+    let laws: Vec<_> = model.muscles().map(|(_, muscle)| muscle.law()).collect();
     let all: Vec<_> =
         model.muscles().enumerate().flat_map(|(n, (_, m))| m.points().iter().map(move |p| (n, p))).collect();
     assert_eq!((vtu.points, vtu.cells, all.len()), (2 * 2 * 27, 2 * 2 * 27, 2 * 2 * 27));
@@ -155,6 +157,11 @@ fn muscle_points_carry_stretch_and_direction() {
         assert!(norm(subtract(fibre[k], normalised(v))) < 1e-12);
         assert!(norm(subtract(points[k], std::array::from_fn(|i| x[i] + b[i]))) < 1e-8);
         assert_eq!((muscle[k], activation[k]), (number as i64, state.controls[number]));
+        // sigma_max f(s) / lambda_ofl, from the law by hand: its energy changes by it per stretch
+        let law = laws[number];
+        let energy = |stretch: f64| law.tension(stretch, activation[k]).energy;
+        let slope = (energy(norm(v) + 1e-5) - energy(norm(v) - 1e-5)) / 2e-5;
+        assert!((tension[k] - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{} {slope}", tension[k]);
     }
     let states = muscle_states(&model, &state, &evaluate(&model, &state));
     let first: f64 = vtu.scalars("volume_mm3").iter().zip(&stretch).take(54).map(|(w, s)| w * s).sum();
@@ -188,6 +195,14 @@ fn marker_points_and_lists_of_frames() {
             assert_eq!(attribute(entry, "timestep"), time);
             let file = path.with_file_name(attribute(entry, "file"));
             assert!(file.is_file(), "{}", file.display());
+        }
+        // the same in JSON
+        let series = fs::read_to_string(path.with_extension("vtu.series")).expect("a series");
+        let series: serde_json::Value = serde_json::from_str(&series).expect("JSON");
+        assert_eq!(series["file-series-version"], "1.0");
+        for (number, (entry, time)) in entries.iter().zip([0.0, 0.1]).enumerate() {
+            let file = &series["files"][number];
+            assert_eq!((file["name"].as_str(), file["time"].as_f64()), (Some(attribute(entry, "file")), Some(time)));
         }
     }
 }

@@ -4,12 +4,12 @@ use super::grid::{Field, Grid};
 use crate::math::tensor::{norm, normalised};
 use crate::model::{Model, State};
 
-/// All quadrature points of all muscles at a state: fibre stretch, unit fibre direction, activation, index of the muscle
-/// (in the order of the model), host element, reference volume (mm3).
+/// All quadrature points of all muscles at a state: fibre stretch, unit fibre direction, tension (force per reference cross-section
+/// of the fibres, kPa = mN/mm2), activation, index of the muscle (in the order of the model), host element, reference volume (mm3).
 pub fn points(model: &Model, state: &State, time_s: f64) -> Grid {
     let mesh = model.mesh();
     let x = model.current(state);
-    let (mut position, mut stretch, mut fibre) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut position, mut stretch, mut fibre, mut tension) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let (mut activation, mut index, mut element, mut volume) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (number, (_, muscle)) in model.muscles().enumerate() {
         for in_element in muscle.points().chunk_by(|a, b| a.host.element == b.host.element) {
@@ -17,9 +17,11 @@ pub fn points(model: &Model, state: &State, time_s: f64) -> Grid {
             for point in in_element {
                 let v = point.deformed_fibre(&local);
                 position.push(mesh.interpolate(point.host, &x));
+                let active = point.activation(&state.controls);
                 stretch.push(norm(v));
                 fibre.push(normalised(v));
-                activation.push(point.activation(&state.controls));
+                tension.push(muscle.law().tension(norm(v), active).force);
+                activation.push(active);
                 index.push(number as i64);
                 element.push(point.host.element as i64);
                 volume.push(point.weight);
@@ -29,6 +31,7 @@ pub fn points(model: &Model, state: &State, time_s: f64) -> Grid {
     let fields = vec![
         Field::scalars("stretch", stretch),
         Field::vectors("fibre", fibre),
+        Field::scalars("tension_kpa", tension),
         Field::scalars("activation", activation),
         Field::integers("muscle", index),
         Field::integers("element", element),
