@@ -7,6 +7,9 @@ use std::path::Path;
 use std::process::Output;
 use tempfile::TempDir;
 
+/// The fit of a beam that is shipped.
+const BEAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/problems/beam/problem.toml");
+
 /// A cantilever under its own weight with one muscle.
 const CANTILEVER: &str = r#"
 [task]
@@ -30,9 +33,6 @@ slab = 0.02
 name = "tip"
 position_mm = [40, 10, 10]
 "#;
-
-/// The first three frames of the built-in fit.
-const THREE_FRAMES: [&str; 2] = ["--set", "fit.frames={first=0,last=2}"];
 
 /// A solver that is not given the iterations it needs.
 const HOPELESS: [&str; 4] = ["--set", "solver.max_iterations=2", "--set", "solver.step_min=0.5"];
@@ -150,12 +150,29 @@ fn the_lock_file_of_a_run_reproduces_it_bit_for_bit() {
 }
 
 #[test]
-fn without_arguments_the_built_in_fit_runs_and_its_lock_file_too_on_any_number_of_threads() {
+fn without_arguments_the_built_in_face_is_fitted() {
     let folder = folder();
-    let page = stdout(&folder, &[&THREE_FRAMES[..], &["--threads", "1"]].concat(), 0);
+    let page = stdout(&folder, &["--set", "fit.frames={first=0,last=0}", "--threads", "1"], 0);
+    for words in ["1 frame fitted", "zygomaticus_major.L", "head: taken out from 6 bone markers"] {
+        assert!(page.contains(words), "{words}:\n{page}");
+    }
+    assert_eq!(json(&folder, "runs/face-0001/status.json")["frames_ok"], 1);
+    assert_eq!(json(&folder, "runs/face-0001/manifest.json")["threads"], 1);
+    let activations = text(&folder, "runs/face-0001/tables/activations.csv");
+    let row: Vec<f64> = activations.lines().nth(1).unwrap().split(',').skip(2).take(30).map(|a| a.parse().unwrap()).collect();
+    assert!(row.len() == 30 && row.iter().all(|a| (0.0..=0.01).contains(a)), "it is at rest: {activations}");
+    // its lock file names the copy of the recording
+    let page = stdout(&folder, &["check", "runs/face-0001/problem.lock.toml"], 0);
+    assert!(page.contains("face: fit; 560 elements"), "{page}");
+}
+
+#[test]
+fn a_fit_and_its_lock_file_are_the_same_on_any_number_of_threads() {
+    let folder = folder();
+    let three = ["run", BEAM, "--set", "fit.frames={first=0,last=2}", "--threads", "1"];
+    let page = stdout(&folder, &three, 0);
     assert!(page.contains("3 frames fitted") && page.contains("top") && page.contains("bottom"), "{page}");
     assert_eq!(json(&folder, "runs/beam-0001/status.json")["frames_ok"], 3);
-    assert_eq!(json(&folder, "runs/beam-0001/manifest.json")["threads"], 1);
     stdout(&folder, &["run", "runs/beam-0001/problem.lock.toml", "--threads", "2", "--out", "again"], 0);
     for table in ["activations.csv", "markers.csv", "muscles.csv", "energies.csv"] {
         let first = text(&folder, &format!("runs/beam-0001/tables/{table}"));
@@ -207,8 +224,8 @@ fn a_fit_holds_a_control_that_follows_a_table() {
     fs::write(folder.path().join("curves.csv"), "time_s,bottom\n0,0.001\n1,0.002\n").unwrap();
     let held = format!("controls.bottom={{csv=\"{}\"}}", folder.path().join("curves.csv").display());
     let frame = ["--set", "fit.frames={first=15,last=15}", "--set", "fit.unknowns=[\"top\"]", "--set", &held];
-    stdout(&folder, &[&frame[..], &["--set", "fit.max_iterations=1", "--dry-run"]].concat(), 0);
-    let page = stdout(&folder, &[&frame[..], &["--out", "run"]].concat(), 0);
+    stdout(&folder, &[&["run", BEAM][..], &frame[..], &["--set", "fit.max_iterations=1", "--dry-run"]].concat(), 0);
+    let page = stdout(&folder, &[&["run", BEAM][..], &frame[..], &["--out", "run"]].concat(), 0);
     assert!(page.contains("frame 15"), "{page}");
     let bottom = column(&text(&folder, "run/tables/activations.csv"), "bottom")[0];
     assert!((bottom - 0.0015).abs() < 1e-6, "half a second on the way: {bottom}");
@@ -302,7 +319,7 @@ fn check_tells_what_is_on_and_what_it_costs() {
     ] {
         assert!(page.contains(words), "`{words}` is not in\n{page}");
     }
-    let page = stdout(&folder, &["check"], 0);
+    let page = stdout(&folder, &["check", BEAM], 0);
     for words in [
         "beam: fit; 24 elements",
         "40 of 40 frames used, 1.30 s at 30.0 Hz",
@@ -314,7 +331,8 @@ fn check_tells_what_is_on_and_what_it_costs() {
     }
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "check writes nothing");
     // a problem whose solve would fail is still checked
-    stdout(&folder, &[&["check"], &HOPELESS[..]].concat(), 0);
+    let page = stdout(&folder, &[&["check"], &HOPELESS[..]].concat(), 0);
+    assert!(page.contains("face: fit; 560 elements") && page.contains("ok: no mistakes"), "{page}");
 }
 
 #[test]
@@ -388,7 +406,8 @@ fn frames_that_do_not_converge_leave_the_others_intact() {
 #[test]
 fn a_fit_that_does_not_converge_says_so_frame_by_frame() {
     let folder = folder();
-    let arguments = ["--set", "fit.frames={first=1,last=1}", "--set", "fit.max_iterations=1", "--out", "run"];
+    let arguments =
+        ["run", BEAM, "--set", "fit.frames={first=1,last=1}", "--set", "fit.max_iterations=1", "--out", "run"];
     let output = risorius(&folder, &arguments);
     assert_eq!(output.status.code(), Some(4));
     let message = String::from_utf8_lossy(&output.stderr);
@@ -423,8 +442,8 @@ fn the_built_in_problem_can_take_another_recording() {
     let folder = folder();
     fs::create_dir(folder.path().join("data")).unwrap();
     // a file of the same name as the built-in one is not the built-in one
-    fs::write(folder.path().join("data/beam.mcap"), "").unwrap();
-    let message = stderr(&folder, &["check", "--set", "fit.markers=data/beam.mcap"], 3);
+    fs::write(folder.path().join("data/face.mcap"), "").unwrap();
+    let message = stderr(&folder, &["check", "--set", "fit.markers=data/face.mcap"], 3);
     assert!(message.contains("error[M001]") && message.contains("it is empty"), "{message}");
 }
 
@@ -437,7 +456,7 @@ fn ctrl_c_keeps_every_finished_frame() {
     let folder = folder();
     let mut child = Command::new(assert_cmd::cargo::cargo_bin("risorius"))
         .current_dir(&folder)
-        .args(["--out", "run", "--set", "output.view=false"])
+        .args(["run", BEAM, "--out", "run", "--set", "output.view=false"])
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
@@ -553,7 +572,7 @@ fn an_estimate_of_the_error_is_told_written_and_costed() {
 fn an_estimate_of_a_fit_tells_the_bias_of_its_controls() {
     let folder = folder();
     let coarse = ["--set", "mesh.block.elements=[3,1,1]", "--set", "fit.frames={first=10,last=11}"];
-    let page = stdout(&folder, &[&["run", "-q", "--estimate", "--out", "out"][..], &coarse].concat(), 0);
+    let page = stdout(&folder, &[&["run", BEAM, "-q", "--estimate", "--out", "out"][..], &coarse].concat(), 0);
     assert!(
         page.contains("Newton steps on halved elements") && page.contains("estimated bias of what was fitted"),
         "{page}"

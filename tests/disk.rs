@@ -11,7 +11,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Eleven frames of the built-in fit.
+/// The fit of a beam that is shipped.
+const BEAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/problems/beam/problem.toml");
+
+/// Eleven frames of it.
 const FRAMES: &str = "fit.frames={first=0,last=30,step=3}";
 
 fn program() -> String {
@@ -122,10 +125,10 @@ fn assert_whole(run: &Path, also: &[&str]) -> BTreeSet<String> {
 fn a_fit_on_a_full_disk_keeps_its_finished_frames_and_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    risorius(folder, &["run", "-q", "--set", FRAMES, "--out", "whole"], 0);
+    risorius(folder, &["run", BEAM, "-q", "--set", FRAMES, "--out", "whole"], 0);
     let mut finished = Vec::new();
     for kilobytes in [60, 300, 701, 1502, 2503] {
-        let script = format!("\"$RISORIUS\" run -q --set '{FRAMES}' --out disk/run");
+        let script = format!("\"$RISORIUS\" run '{BEAM}' -q --set '{FRAMES}' --out disk/run");
         let Some(output) = on_a_disk(folder, kilobytes, &script) else { return };
         let stderr = refused(&output, &NO_ROOM);
         assert!(stderr.contains("go on with: risorius resume disk/run"), "{stderr}");
@@ -192,7 +195,7 @@ fn a_forward_run_on_a_full_disk_keeps_its_finished_frames() {
 
 /// Three frames of the built-in fit, and their recording.
 fn finished(folder: &Path) {
-    risorius(folder, &["run", "-q", "--set", "fit.frames={first=0,last=20,step=10}", "--out", "run"], 0);
+    risorius(folder, &["run", BEAM, "-q", "--set", "fit.frames={first=0,last=20,step=10}", "--out", "run"], 0);
     fs::copy(folder.join("run/recording.mcap"), folder.join("take.mcap")).expect("copied");
 }
 
@@ -276,7 +279,7 @@ fn a_read_only_disk_is_named_and_nothing_is_lost() {
 fn an_output_that_takes_nothing_is_an_error_and_the_run_is_there() {
     let folder = tempfile::tempdir().expect("a folder");
     let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("there");
-    let arguments = ["run", "-q", "--set", "fit.frames={first=0,last=1}", "--out", "run"];
+    let arguments = ["run", BEAM, "-q", "--set", "fit.frames={first=0,last=1}", "--out", "run"];
     let output = Command::new(program()).current_dir(&folder).args(arguments).stdout(full).output().expect("it runs");
     refused(&output, &["cannot write to standard output", NO_ROOM[0]]);
     let run = folder.path().join("run");

@@ -28,11 +28,14 @@ fn stands_alone(page: &str) {
     assert!(!page.contains("NaN") && !page.contains("inf "), "a number is missing");
 }
 
+/// The fit of a beam that is shipped.
+const BEAM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/problems/beam/problem.toml");
+
 #[test]
 fn a_fit_leaves_its_page() {
     let folder = tempfile::tempdir().unwrap();
     // a pair of sides, and a name that would break a page which does not escape it
-    let lock = ["run", "--set", "fit.frames={first=0,last=20,step=10}", "--out", "first"];
+    let lock = ["run", BEAM, "--set", "fit.frames={first=0,last=20,step=10}", "--out", "first"];
     let (exit, _, stderr) = risorius(folder.path(), &lock);
     assert!(exit == 0 && stderr.contains("all on one page: first/report.html"), "{stderr}");
     let text = fs::read_to_string(folder.path().join("first/problem.lock.toml")).unwrap();
@@ -85,7 +88,7 @@ fn a_fit_leaves_its_page() {
 #[test]
 fn what_the_markers_can_and_cannot_tell_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let (exit, ..) = risorius(folder.path(), &["run", "--set", "fit.frames={first=10,last=10}", "--out", "run"]);
+    let (exit, ..) = risorius(folder.path(), &["run", BEAM, "--set", "fit.frames={first=10,last=10}", "--out", "run"]);
     assert_eq!(exit, 0);
     let tables = folder.path().join("run/tables");
     let page = || {
@@ -151,7 +154,7 @@ fn what_the_markers_can_and_cannot_tell_is_said() {
 fn frames_that_failed_stand_first() {
     let folder = tempfile::tempdir().unwrap();
     let arguments =
-        ["run", "--set", "fit.frames={first=0,last=10,step=10}", "--set", "fit.max_iterations=3", "--out", "run"];
+        ["run", BEAM, "--set", "fit.frames={first=0,last=10,step=10}", "--set", "fit.max_iterations=3", "--out", "run"];
     let (exit, _, stderr) = risorius(folder.path(), &arguments);
     let status = fs::read_to_string(folder.path().join("run/status.json")).unwrap();
     assert!(exit == 4 && status.contains("\"partial\""), "the test needs one frame of each kind: {status} {stderr}");

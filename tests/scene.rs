@@ -834,6 +834,7 @@ proptest! {
         scene.muscles[0].fibres = FibresSpec::Uniform([angle, 0.0, -0.0]);
         scene.muscles[0].cut = angle > 0.0;
         scene.muscles[0].taper_mm = (c1 > 0.0).then_some(c1);
+        scene.muscles[0].fibre_turn_deg = [angle, 0.0, activation, -0.0];
         scene.controls[0].value = ControlValue::Constant(activation);
         scene.probes[0].name = name;
         scene.fit.as_mut().unwrap().topic = Some(topic);
@@ -841,6 +842,25 @@ proptest! {
         prop_assert_eq!(content(&scene), content(&again));
         prop_assert_eq!(scene.lock(), again.lock());
     }
+}
+
+#[test]
+fn outer_unknowns_are_read_and_written_back() {
+    let outer = "[fit.outer]\nframes = [7, 2]\nheld_out = [4]\n[[fit.outer.unknown]]\nstiffness = \"tissue\"\nsd = 0.2\n\
+                 [[fit.outer.unknown]]\nsigma_max = \"slab\"\nbounds = [0.5, 3]\n[[fit.outer.unknown]]\nfibre_angle = \"slab\"\n\
+                 mode = \"y\"\nsd_deg = 20\nbounds_deg = [-30, 40]\n[[marker]]";
+    let text = WHOLE.replacen("[[marker]]", outer, 1).replacen("units = \"m\"", "units = \"m\"\nsd_mm = 0.3", 1);
+    let scene = parse(&text, &["muscle.slab.fibre_turn_deg=[1, 0, -2.5, 0]"]).unwrap();
+    assert_eq!(scene.muscles[0].fibre_turn_deg, [1.0, 0.0, -2.5, 0.0]);
+    let read = scene.fit.as_ref().unwrap().outer.as_ref().unwrap();
+    assert_eq!((read.frames.as_deref(), &read.held_out[..]), (Some(&[2, 7][..]), &[4][..]));
+    let labels: Vec<String> = read.unknowns.iter().map(|unknown| unknown.what.label()).collect();
+    assert_eq!(labels, ["stiffness.tissue", "sigma_max.slab", "fibre_angle.slab.y"]);
+    let known: Vec<_> = read.unknowns.iter().map(|unknown| (unknown.sd, unknown.bounds)).collect();
+    assert_eq!(known, [(Some(0.2), [0.1, 10.0]), (None, [0.5, 3.0]), (Some(20.0), [-30.0, 40.0])]);
+    let again = parse(&scene.lock(), &[]).unwrap();
+    assert_eq!(content(&scene), content(&again));
+    assert_eq!(scene.lock(), again.lock());
 }
 
 /// The problem file that the guide shows is one that can be read.

@@ -3,6 +3,7 @@
 use super::Flags;
 use super::estimate::Estimates;
 use super::noticed::noticed;
+use super::outer::PAGE;
 use super::progress::Meter;
 use super::run::{Run, Tally};
 use super::telling::Telling;
@@ -139,9 +140,11 @@ impl<'a> Book<'a> {
         self.record.finish(work, self.estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
         let controls: Vec<&str> = self.labels.iter().map(String::as_str).collect();
         let sought: Vec<&str> = fit.unknowns().iter().map(|k| self.labels[*k].as_str()).collect();
+        // none where all frames share nothing that was sought
+        let shared = std::fs::read_to_string(run.folder.path().join(PAGE)).unwrap_or_default();
         let summary = FitSummary {
             name: &scene.name,
-            recording: &(page(&self.heads, registration.centre, &sought) + &registration.to_string()),
+            recording: &(shared + &page(&self.heads, registration.centre, &sought) + &registration.to_string()),
             controls: &controls,
             bones: !self.model.bones().is_empty(),
             frames: &self.fitted,

@@ -45,6 +45,9 @@ pub(super) fn fit(
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
     let estimates = Estimates::new(prepared, settings(scene), placed)?;
     let mut book = Book::new(&built.model, scene, &fit, record, estimates);
+    for (frame, warning) in &run.noticed {
+        book.tally.keep(*frame, std::slice::from_ref(warning));
+    }
     let mut meter = Meter::new(flags, frames.len());
     let mut done = 0;
     // frames wait for the others where the clip is smoothed

@@ -18,6 +18,7 @@ mod inspect;
 mod markers;
 mod new;
 mod noticed;
+mod outer;
 mod prepare;
 mod problem;
 mod progress;

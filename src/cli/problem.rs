@@ -10,12 +10,12 @@ use crate::scene::{FitSpec, Scene, Units};
 use std::path::Path;
 
 /// The problem that runs without a file.
-const PROBLEM: &str = include_str!("../../problems/beam/problem.toml");
+const PROBLEM: &str = include_str!("../../problems/face/problem.toml");
 /// Its recording.
-const RECORDING: &[u8] = include_bytes!("../../data/beam.mcap");
+const RECORDING: &[u8] = include_bytes!("../../data/face.mcap");
 /// What messages about them call the files.
-const NAME: &str = "beam/problem.toml (built in)";
-const RECORDING_NAME: &str = "beam.mcap (built in)";
+const NAME: &str = "face/problem.toml (built in)";
+const RECORDING_NAME: &str = "face.mcap (built in)";
 
 /// A scene and how to read its recording.
 pub(super) struct Source {
@@ -34,7 +34,7 @@ impl Source {
             }
             None => {
                 let mut scene = Scene::parse(PROBLEM, NAME, Path::new(""), &flags.set())?;
-                "beam".clone_into(&mut scene.name);
+                "face".clone_into(&mut scene.name);
                 Ok(Source { scene, built_in: true })
             }
         }

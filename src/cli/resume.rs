@@ -33,5 +33,5 @@ pub(super) fn resume(folder: &Path, flags: &Flags) -> Result<Ending> {
     if flags.dry_run {
         return Ok(Ending::Ok);
     }
-    run::go_on(&source, &prepared, Run::again(folder, guard.inputs)?, flags, (checkpoints, left))
+    run::go_on(source, prepared, Run::again(folder, guard.inputs)?, flags, (checkpoints, left))
 }

@@ -1,11 +1,12 @@
 //! `risorius run [problem.toml]`: does what the problem's task says, and leaves a run folder.
 
 use super::check::describe;
+use super::outer::Settled;
 use super::prepare::{Prepared, prepare};
 use super::problem::Source;
 use super::progress::Meter;
 use super::terminal::tell;
-use super::{Ending, Flags, fibres, fit, forward, more_about, study};
+use super::{Ending, Flags, fibres, fit, forward, more_about, outer, study};
 use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
@@ -24,7 +25,10 @@ use std::time::Instant;
 pub(super) struct Run {
     pub folder: RunFolder,
     pub start: Instant,
-    inputs: Vec<Input>,
+    /// Files that were read.
+    pub inputs: Vec<Input>,
+    /// What came up before the first frame.
+    pub noticed: Vec<(Frame, Warning)>,
     interrupted: Arc<AtomicBool>,
 }
 
@@ -59,7 +63,7 @@ impl Run {
     /// That goes on in the folder of a run that began before.
     pub fn again(folder: &Path, inputs: Vec<Input>) -> Result<Run> {
         let folder = RunFolder::open(folder)?;
-        Ok(Run { folder, start: Instant::now(), inputs, interrupted: watch_interrupt() })
+        Ok(Run { folder, start: Instant::now(), inputs, noticed: Vec::new(), interrupted: watch_interrupt() })
     }
 
     /// Whether Ctrl-C was pressed.
@@ -122,29 +126,51 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         Task::Fit => Some(Checkpoints::create(&folder, &Guard::new(&lock, inputs.clone()))?),
         Task::Forward => None,
     };
-    let run = Run { folder, start, inputs, interrupted: watch_interrupt() };
+    let run = Run { folder, start, inputs, noticed: Vec::new(), interrupted: watch_interrupt() };
     run.write_running(&Tally::default())?;
-    let mut work = Work::default();
-    let outcome = task(&source, &prepared, &run, flags, (checkpoints.as_ref(), None), &mut work);
-    let ending = finish(&run, Some(&built.model), &work, outcome, flags);
-    if checkpoints.is_some() {
-        tell_resume(&ending, run.folder.path());
-    }
-    ending
+    solve(source, prepared, run, flags, (checkpoints, None))
 }
 
 /// Goes on with a fit that was interrupted.
 pub(super) fn go_on(
-    source: &Source,
-    prepared: &Prepared,
+    source: Source,
+    prepared: Prepared,
     run: Run,
     flags: &Flags,
     (checkpoints, left): (Checkpoints, Left),
 ) -> Result<Ending> {
+    solve(source, prepared, run, flags, (Some(checkpoints), Some(left)))
+}
+
+/// Finds what all frames share, then does the task.
+fn solve(
+    mut source: Source,
+    prepared: Prepared,
+    mut run: Run,
+    flags: &Flags,
+    (checkpoints, left): (Option<Checkpoints>, Option<Left>),
+) -> Result<Ending> {
     let mut work = Work::default();
-    let outcome = task(source, prepared, &run, flags, (Some(&checkpoints), Some(left)), &mut work);
+    let resumable = checkpoints.is_some();
+    let settled = match outer::settle(&mut source, prepared, checkpoints, &mut run, flags) {
+        Ok(settled) => settled,
+        Err(error) => {
+            let ending = finish(&run, None, &work, Err(error), flags);
+            if resumable {
+                tell_resume(&ending, run.folder.path());
+            }
+            return ending;
+        }
+    };
+    let Settled { prepared, checkpoints, interrupted } = settled;
+    let outcome = match interrupted {
+        true => Ok(Tally { interrupted, ..Tally::default() }),
+        false => task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work),
+    };
     let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags);
-    tell_resume(&ending, run.folder.path());
+    if resumable {
+        tell_resume(&ending, run.folder.path());
+    }
     ending
 }
 
@@ -175,7 +201,8 @@ fn run_folder(name: &str, flags: &Flags) -> Result<RunFolder> {
 /// Makes the folder of a run that reads these files, and writes that it runs.
 pub(super) fn begin(name: &str, files: &[&Path], flags: &Flags) -> Result<Run> {
     let inputs = files.iter().map(|path| Input::read(path)).collect::<Result<_>>()?;
-    let run = Run { folder: run_folder(name, flags)?, start: Instant::now(), inputs, interrupted: watch_interrupt() };
+    let folder = run_folder(name, flags)?;
+    let run = Run { folder, start: Instant::now(), inputs, noticed: Vec::new(), interrupted: watch_interrupt() };
     run.write_running(&Tally::default())?;
     Ok(run)
 }

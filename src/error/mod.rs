@@ -716,6 +716,22 @@ pub enum Error {
         /// The change at which the fit counts as converged.
         required: f64,
     },
+    /// What all frames share was not found.
+    #[error(
+        "what all frames share was not found in {iterations} iterations ({reason}); last step {step:.1e} of a range, required {required:.1e}"
+    )]
+    OuterNotConverged {
+        /// Gauss-Newton iterations.
+        iterations: usize,
+        /// Why it ended.
+        reason: &'static str,
+        /// Largest change of an unknown in the last step, as a part of its range.
+        step: f64,
+        /// The change at which the search counts as converged.
+        required: f64,
+        /// The table in the problem file.
+        place: Box<Place>,
+    },
     /// A file is not what measured directions are read from.
     #[error("{}: {message}", path.display())]
     Axes {
@@ -947,6 +963,7 @@ impl Error {
             Error::NoAxes { .. } => "K005",
             Error::FibreSystem { .. } => "F010",
             Error::FitNotConverged { .. } => "F002",
+            Error::OuterNotConverged { .. } => "F014",
             Error::NoMarkersInFrame { .. } => "F003",
             Error::Optimiser { .. } => "F004",
             Error::NotAFit { .. } => "C024",
@@ -1008,6 +1025,7 @@ impl Error {
             | Error::MarkerFarFromSurface { place, .. }
             | Error::NothingToMatch { place }
             | Error::NoAxes { place, .. }
+            | Error::OuterNotConverged { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),
             Error::Misregistered(wrong) => Some(&wrong.place),

@@ -142,6 +142,11 @@ impl Error {
                 "raise fit.max_iterations, or look at the residuals: do the labels and positions belong together?"
                     .into(),
             ),
+            Error::OuterNotConverged { .. } => Some(
+                "give `sd` to what the frames cannot tell, or raise fit.outer.max_iterations; risorius explain F013 says what is \
+                 confounded with what"
+                    .into(),
+            ),
             Error::HeadNotSeen { .. } | Error::NoMarkersInFrame { .. } => Some("leave the frame out: frames = { first = .., last = .. }".into()),
             Error::Axes { .. } => Some(
                 "a table x,y,z,vx,vy,vz as CSV, a field of vectors or tensors in a VTK, VTU or VTP file, lines in one, or a \

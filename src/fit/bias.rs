@@ -2,7 +2,7 @@
 //!
 //! A better model has its markers at m + dm where this one has them at m. To first order its fit would move the controls by
 //!   dq = - (J^T J + P)^-1 J^T W dm,   J = W dm/dq on the controls that are free, P what else is asked for
-//! and the controls that were fitted are off by the opposite.
+//! but smoothness, whose other frames are off alike; and the controls that were fitted are off by the opposite.
 
 use super::covariance::Bound;
 use super::estimate::Estimate;
@@ -25,8 +25,7 @@ pub fn bias(estimate: &Estimate, markers: &[Marker], unknowns: &[usize], shift: 
     let weights = shown.zip(&estimate.weights);
     let weighted = weights.flat_map(|(((marker, shift), _), w)| shift.map(|s| w * s / marker.sd.unwrap_or(1.0)));
     let weighted = DVector::from_iterator(estimate.jacobian.nrows(), weighted);
-    let whole = &estimate.information + &estimate.prior;
-    let whole = whole.select_rows(&free).select_columns(&free);
+    let whole = estimate.response.select_rows(&free).select_columns(&free);
     let right = estimate.jacobian.select_columns(&free).tr_mul(&weighted);
     for (k, value) in free.iter().zip(solve(&whole, &right)) {
         all[unknowns[*k]] = value;

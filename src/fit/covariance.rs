@@ -63,6 +63,21 @@ impl SymmetricInverse {
         variance.is_finite().then_some(variance)
     }
 
+    /// M^-1 on the directions that are seen.
+    pub fn matrix(&self) -> DMatrix<f64> {
+        let n = self.sizes.len();
+        let mut inverse = DMatrix::zeros(n, n);
+        let Some(eigen) = &self.eigen else { return inverse };
+        let largest = eigen.eigenvalues.max();
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > UNSEEN * largest {
+                inverse += vector * vector.transpose() / *value;
+            }
+        }
+        let part = |a: usize| if self.sizes[a] > 0.0 { 1.0 / self.sizes[a] } else { 0.0 };
+        DMatrix::from_fn(n, n, |a, b| inverse[(a, b)] * part(a) * part(b))
+    }
+
     /// v^T M^-1 v on the directions that are seen.
     pub fn square(&self, v: &[f64]) -> f64 {
         let Some(eigen) = &self.eigen else { return 0.0 };
@@ -91,6 +106,8 @@ mod tests {
         assert!((sd[0].expect("free") - inverse[(0, 0)].sqrt()).abs() < 1e-12);
         assert!((sd[1].expect("free") - inverse[(1, 1)].sqrt()).abs() < 1e-12);
         assert_eq!(sd[2], None);
+        let whole = SymmetricInverse::new(&j.tr_mul(&j)).matrix();
+        assert!((whole * j.tr_mul(&j) - DMatrix::identity(3, 3)).amax() < 1e-10);
     }
 
     #[test]

@@ -71,6 +71,9 @@ pub struct Estimate {
     pub information: DMatrix<f64>,
     /// What the rest of the objective adds to it.
     pub prior: DMatrix<f64>,
+    /// The second derivative of the objective of this frame alone, without smoothness: an error that all frames share moves the
+    /// controls as it says, however they are tied to each other.
+    pub response: DMatrix<f64>,
     /// Gradient of the whole objective by the controls that are sought.
     pub gradient: Vec<f64>,
     /// The variance of a weighted residual: 1 where all markers have a standard deviation, else what the residuals of the

@@ -2,7 +2,7 @@
 
 use super::free_head;
 use super::gauss_newton::LeastSquares;
-use super::objective::{Instant, Objectives, Past, Sum};
+use super::objective::{Instant, Objective as _, Objectives, Past, Sum};
 use super::placement::Marker;
 use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
 use crate::error::{Error, Result};
@@ -63,6 +63,17 @@ impl Aims<'_> {
         let rest = self.objectives.values(&Instant { time_s: self.time_s, a: &a, before: self.before });
         let all = std::iter::once(("markers", self.objectives.loss.cost(residuals))).chain(rest);
         all.map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+
+    /// The second derivative of what ties the frame to those before, by the controls in their units.
+    pub fn tied(&self, q: &[f64]) -> DMatrix<f64> {
+        let a = self.objectives.parts_of(q);
+        let mut sum = Sum::zero(q.len());
+        if let Some(smoothness) = &self.objectives.smoothness {
+            smoothness.add(&Instant { time_s: self.time_s, a: &a, before: self.before }, &mut sum);
+        }
+        let sizes: Vec<f64> = self.objectives.sizes().collect();
+        DMatrix::from_fn(q.len(), q.len(), |a, b| sum.hessian[(a, b)] / (sizes[a] * sizes[b]))
     }
 
     /// The second derivative of all but the markers, by the controls in their units.
@@ -165,7 +176,8 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
 
     /// The motion that takes the measured markers nearest to those of the model, where the head is free.
     fn back(&self, model: &[[f64; 3]]) -> Motion {
-        let nearest = if self.free_head { free_head::nearest(model, &self.measured) } else { None };
+        let loss = self.aims.objectives.loss;
+        let nearest = if self.free_head { free_head::nearest(model, &self.measured, loss) } else { None };
         nearest.unwrap_or(Motion::REST)
     }
 
@@ -288,7 +300,9 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             let x = model.current(&inner.base.state);
             let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
             let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
-            let reduced = free_head::project(&j, &self.back(&positions), &self.measured);
+            let back = self.back(&positions);
+            let rho = free_head::weights(&positions, &self.measured, &back, self.aims.objectives.loss);
+            let reduced = free_head::project(&j, &back, &self.measured, &rho);
             inner.held_head = Some(std::mem::replace(&mut j, reduced));
         }
         Ok(j)

@@ -10,21 +10,49 @@
 //!
 //!   J = (1 - Q Q^T) J_q
 //!
+//! With a robust loss the rigid fit is weighed again until it settles, and the projection counts markers by the same weights.
+//!
 //! and J^T J = J_q^T J_q - J_q^T H (H^T H)^-1 H^T J_q is the information on q with h unknown: standard deviations from it hold
 //! what the head takes away. h itself has the covariance (H^T H)^-1 + T C T^T and the covariance - T C with the controls, where
 //! C is that of the controls and T = (H^T H)^-1 H^T J_q.
 
 use super::covariance::Bound;
 use super::frame::Measured;
+use super::objective::loss::Loss;
 use crate::math::motion::{Allowed, Motion, Pair, centre, weighted};
 use crate::math::tensor::{norm, subtract};
 use nalgebra::{DMatrix, SMatrix};
 
-/// The motion that takes the measured markers nearest to those of the model, by their weights. `None` below three of them, and
-/// where they lie on a line.
-pub fn nearest(model: &[[f64; 3]], measured: &[Measured]) -> Option<Motion> {
+/// Steps of a fit that sets outliers aside, and the change of a weight at which it ends.
+const REWEIGHTED: usize = 200;
+const SETTLED: f64 = 1e-13;
+
+/// The motion that takes the measured markers nearest to those of the model, by their weights and as the loss counts them:
+/// where it is robust, by squares that are weighed again until that changes nothing. `None` below three of them, and where they
+/// lie on a line.
+pub fn nearest(model: &[[f64; 3]], measured: &[Measured], loss: Loss) -> Option<Motion> {
     let pairs: Vec<Pair> = measured.iter().zip(model).map(|(m, x)| (m.position, *x)).collect();
-    weighted(&pairs, |k| measured[k].weight * measured[k].weight, Allowed::RIGID)
+    let fitted = |rho: &[f64]| weighted(&pairs, |k| rho[k] * measured[k].weight * measured[k].weight, Allowed::RIGID);
+    let mut rho = vec![1.0; measured.len()];
+    let mut motion = fitted(&rho)?;
+    if loss == Loss::Quadratic {
+        return Some(motion);
+    }
+    for _ in 0..REWEIGHTED {
+        let next = weights(model, measured, &motion, loss);
+        let change = next.iter().zip(&rho).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        (motion, rho) = (fitted(&next)?, next);
+        if change < SETTLED {
+            break;
+        }
+    }
+    Some(motion)
+}
+
+/// How much each measured marker counts by a loss where they are placed by a motion.
+pub fn weights(model: &[[f64; 3]], measured: &[Measured], motion: &Motion, loss: Loss) -> Vec<f64> {
+    let residual = |(m, x): (&Measured, &[f64; 3])| subtract(*x, motion.place(m.position)).map(|d| m.weight * d);
+    loss.weights(&measured.iter().zip(model).flat_map(residual).collect::<Vec<f64>>())
 }
 
 /// H: by a turn (rad) about the centre of the placed markers, then by a shift (mm), of the motion that takes the measured
@@ -46,10 +74,23 @@ fn columns(motion: &Motion, measured: &[Measured]) -> DMatrix<f64> {
     h
 }
 
-/// J from J_q: what no motion of the head explains.
-pub fn project(j: &DMatrix<f64>, motion: &Motion, measured: &[Measured]) -> DMatrix<f64> {
-    let q = columns(motion, measured).qr().q();
-    j - &q * q.tr_mul(j)
+/// J from J_q: what no motion of the head explains, the markers counting by `rho`.
+pub fn project(j: &DMatrix<f64>, motion: &Motion, measured: &[Measured], rho: &[f64]) -> DMatrix<f64> {
+    let h = columns(motion, measured);
+    let weighted = scaled(&h, rho);
+    // 1 - H (H^T W H)^-1 H^T W with W^1/2 H = Q R
+    let qr = weighted.qr();
+    let (q, r) = (qr.q(), qr.r());
+    let part = q.tr_mul(&scaled(j, rho));
+    match r.solve_upper_triangular(&part) {
+        Some(moved) => j - h * moved,
+        None => j - &q * q.tr_mul(j),
+    }
+}
+
+/// W^1/2 times the rows.
+fn scaled(rows: &DMatrix<f64>, rho: &[f64]) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.nrows(), rows.ncols(), |row, k| rho[row / 3].sqrt() * rows[(row, k)])
 }
 
 /// How a frame's head was found.
@@ -67,16 +108,16 @@ pub struct FreeHead {
     pub inflation: Vec<Option<f64>>,
 }
 
-/// The head at the end of a fit. `j` is J_q there, `bounds` where the controls that are sought lie, `variance` that of a
+/// The head at the end of a fit. `rho` is how much each marker counts, `j` is J_q there, `bounds` where the controls that are sought lie, `variance` that of a
 /// weighted residual.
 pub fn describe(
     back: &Motion,
-    measured: &[Measured],
+    (measured, rho): (&[Measured], &[f64]),
     j: &DMatrix<f64>,
     bounds: &[Bound],
     variance: Option<f64>,
 ) -> FreeHead {
-    let h = columns(back, measured);
+    let (h, j) = (scaled(&columns(back, measured), rho), scaled(j, rho));
     let free: Vec<usize> = (0..bounds.len()).filter(|k| bounds[*k] == Bound::Free).collect();
     let of_controls = j.select_columns(&free);
     let unknown = FreeHead {
@@ -135,4 +176,53 @@ pub fn page(heads: &[(usize, FreeHead)], of: [f64; 3], controls: &[&str]) -> Str
         }
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The gradient from projected derivatives is that of the sum that is left when the head is fitted anew, with an outlier.
+    #[test]
+    fn the_gradient_is_that_of_the_sum_without_the_head() {
+        let entry = |a: usize, b: usize| ((7 * a + 3 * b + a * b) as f64).sin();
+        let count = 7;
+        let place = |k: usize, q: &[f64]| -> [f64; 3] {
+            std::array::from_fn(|i| 30.0 * entry(k, i) + (0..2).map(|c| entry(3 * k + i, c + 5) * q[c]).sum::<f64>())
+        };
+        let measured: Vec<Measured> = (0..count)
+            .map(|k| {
+                let off = if k == 2 { 9.0 } else { 0.2 };
+                let x = place(k, &[0.3, -0.2]);
+                let weight = 1.0 + 0.2 * entry(k, 1);
+                Measured { marker: k, position: std::array::from_fn(|i| x[i] + off * entry(k, i + 9)), weight }
+            })
+            .collect();
+        let model = |q: &[f64]| -> Vec<[f64; 3]> { (0..count).map(|k| place(k, q)).collect() };
+        let residuals = |q: &[f64], motion: &Motion| -> Vec<f64> {
+            let of = |(m, x): (&Measured, [f64; 3])| subtract(x, motion.place(m.position)).map(|d| m.weight * d);
+            measured.iter().zip(model(q)).flat_map(of).collect()
+        };
+        let j = DMatrix::from_fn(3 * count, 2, |row, c| measured[row / 3].weight * entry(row, c + 5));
+        for loss in [Loss::Quadratic, Loss::Huber { k: 1.5 }, Loss::Cauchy { c: 3.0 }] {
+            let cost = |q: &[f64]| loss.cost(&residuals(q, &nearest(&model(q), &measured, loss).expect("seen")));
+            let q = [0.1, 0.4];
+            let motion = nearest(&model(&q), &measured, loss).expect("seen");
+            let rho = weights(&model(&q), &measured, &motion, loss);
+            let (gradient, _) = loss.model(&residuals(&q, &motion), &project(&j, &motion, &measured, &rho));
+            for c in 0..2 {
+                let moved = |by: f64| {
+                    let mut moved = q;
+                    moved[c] += by;
+                    cost(&moved)
+                };
+                let slope = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+                assert!(
+                    (slope - gradient[c]).abs() < 1e-5 * slope.abs().max(1.0),
+                    "{loss:?}: {slope} {}",
+                    gradient[c]
+                );
+            }
+        }
+    }
 }

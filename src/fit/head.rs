@@ -6,7 +6,7 @@
 
 use super::placement::unknown_label;
 use crate::error::{Cause, Error, Misregistration, Result, Warning};
-use crate::markers::{Poses, Recording};
+use crate::markers::{BoneNoise, Poses, Recording};
 use crate::math::motion::{Allowed, Motion, Pair, centre, rms, robust, spread};
 use crate::math::tensor::{norm, subtract};
 use crate::scene::{AxisSpec, FitSpec, HeadSpec};
@@ -69,7 +69,11 @@ pub fn still(
     let spec = &fit.registration;
     let (frames, slipped) = match &spec.head {
         HeadSpec::None | HeadSpec::Estimate => return Ok(None),
-        HeadSpec::BoneMarkers(labels) => from_markers(fit, labels, recording, neutral)?,
+        HeadSpec::BoneMarkers(labels) => {
+            let (frames, slipped, noise) = from_markers(fit, labels, recording, neutral)?;
+            recording.bones = noise;
+            (frames, slipped)
+        }
         HeadSpec::PoseTopic(_) => (from_poses(fit, recording, neutral, poses)?, Vec::new()),
     };
     for (shown, head) in recording.frames.iter_mut().zip(&frames) {
@@ -96,7 +100,7 @@ fn from_markers(
     labels: &[String],
     recording: &Recording,
     neutral: usize,
-) -> Result<(Vec<HeadFrame>, Vec<Slip>)> {
+) -> Result<(Vec<HeadFrame>, Vec<Slip>, Option<BoneNoise>)> {
     let column = |label: &String| {
         let found = recording.labels.iter().position(|known| known == label);
         found.ok_or_else(|| unknown_label(label, &recording.labels, &fit.registration.head_place))
@@ -114,6 +118,8 @@ fn from_markers(
         .map(|label| Slip { label: label.clone(), frames: 0, shown: 0, first: 0, most_mm: 0.0 })
         .collect();
     let mut frames = Vec::with_capacity(recording.frames.len());
+    // those that count in each frame, and what is left of them
+    let (mut counted, mut square, mut freedom) = (Vec::with_capacity(recording.frames.len()), 0.0, 0);
     for (index, frame) in recording.frames.iter().enumerate() {
         let shown: Vec<usize> =
             (0..columns.len()).filter(|k| rest[*k].is_some() && frame.positions_mm[columns[*k]].is_some()).collect();
@@ -121,6 +127,7 @@ fn from_markers(
         let pairs: Vec<Pair> = shown.iter().filter_map(pair).collect();
         let Some(agreed) = robust(&pairs, Allowed::RIGID, least) else {
             frames.push(HeadFrame { motion: None, rms_mm: None, markers: pairs.len() });
+            counted.push(Vec::new());
             continue;
         };
         for ((k, off), distance) in shown.iter().zip(&agreed.off).zip(&agreed.distances) {
@@ -133,13 +140,24 @@ fn from_markers(
             }
         }
         let markers = agreed.off.iter().filter(|off| !**off).count();
+        counted.push(shown.iter().zip(&agreed.off).filter(|(_, off)| !**off).map(|(k, _)| *k).collect());
+        if index != neutral {
+            square += agreed.rms * agreed.rms * markers as f64;
+            freedom += (3 * markers).saturating_sub(6);
+        }
         frames.push(HeadFrame { motion: Some(agreed.motion), rms_mm: Some(agreed.rms), markers });
     }
     if frames[neutral].motion.is_none() {
         return Err(unknown(fit, neutral, known.len()));
     }
     slips.retain(|slip| slip.frames > 0);
-    Ok((frames, slips))
+    // the noise of the neutral frame is in every distance too
+    let noise = (freedom > 0).then(|| BoneNoise {
+        variance_mm2: 0.5 * square / freedom as f64,
+        neutral_mm: rest,
+        shown: counted,
+    });
+    Ok((frames, slips, noise))
 }
 
 fn from_poses(fit: &FitSpec, recording: &Recording, neutral: usize, poses: Option<&Poses>) -> Result<Vec<HeadFrame>> {

@@ -8,7 +8,7 @@
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
 //! ([`sensitivity`]). Before the first, the recording is brought to the model ([`registration`]). Frames follow each other
 //! warm ([`sequence`]), and may then be smoothed all at once ([`smoother`]); [`covariance`] and [`identifiability`] say how far
-//! an answer can be believed, [`advise`] which further markers would tell more.
+//! an answer can be believed, [`advise`] which further markers would tell more. [`outer`] finds what all frames share.
 
 pub mod advise;
 pub mod bias;
@@ -19,9 +19,11 @@ pub mod frame;
 pub mod free_head;
 pub mod gauss_newton;
 pub mod head;
+mod head_error;
 pub mod identifiability;
 pub mod objective;
 mod observed;
+pub mod outer;
 pub mod placement;
 pub mod recording;
 pub mod registration;

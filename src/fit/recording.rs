@@ -1,5 +1,6 @@
 //! The recording that a fit names, and which of its frames it asks for.
 
+use super::outer;
 use crate::error::{Error, Result};
 use crate::markers::{self, Poses, ReadOptions, Recording, read_poses, read_poses_bytes};
 use crate::scene::{FitSpec, FramesSpec, HeadSpec, Units};
@@ -43,7 +44,7 @@ pub fn poses(fit: &FitSpec, recording: &Recording, embedded: Option<&[u8]>) -> R
 /// The frames of a recording that a fit asks for.
 ///
 /// # Errors
-/// Where the recording does not have the first or the last of them.
+/// Where the recording does not have the first or the last of them, or one that `[fit.outer]` names.
 pub fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>> {
     let count = recording.frames.len();
     let FramesSpec { first, last, step } = fit.frames;
@@ -51,5 +52,6 @@ pub fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>>
     if let Some(frame) = [first, last].into_iter().find(|frame| *frame >= count) {
         return Err(Error::NoSuchFrame { frame, count, place: Box::new(fit.frames_place.clone()) });
     }
+    fit.outer.as_ref().map_or(Ok(()), |outer| outer::exist(outer, recording))?;
     Ok((first..=last).step_by(step).collect())
 }

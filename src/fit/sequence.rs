@@ -5,7 +5,9 @@ use super::estimate::{Estimate, Memory, Optimum};
 use super::frame::{Aims, Directions, FrameProblem, Measured};
 use super::free_head;
 use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
+use super::head_error::{HeadError, taken};
 use super::identifiability::Evidence;
+use super::objective::loss::Loss;
 use super::objective::{Objectives, Past};
 use super::observed::{Log, own_error};
 use super::placement::{Marker, check_units, place};
@@ -166,6 +168,29 @@ impl<'m> Fit<'m> {
         Ok(self.estimate(recording, frame, (measured_mm, measured), optimum))
     }
 
+    /// Lets a body come to rest that was in equilibrium with nearly the same model: same controls, same loads. The next frame
+    /// starts from there.
+    ///
+    /// # Errors
+    /// An equilibrium that is not found.
+    pub fn settle(&mut self, near: &Equilibrium) -> Result<()> {
+        let to = Drive { controls: near.state.controls.clone(), load: near.state.load };
+        self.last = self.solver.equilibrium_near(&near.state, &near.state, &to)?;
+        self.directions = None;
+        Ok(())
+    }
+
+    /// Weighted residuals of a frame at the controls of an equilibrium of nearly the same model.
+    ///
+    /// # Errors
+    /// A frame without markers, an equilibrium that is not found.
+    pub fn residuals_near(&mut self, recording: &Recording, frame: usize, near: &Equilibrium) -> Result<Vec<f64>> {
+        let (_, measured) = self.shown(recording, frame)?;
+        self.settle(near)?;
+        let q: Vec<f64> = self.unknowns.iter().map(|k| near.state.controls[*k]).collect();
+        self.problem(recording.frames[frame].time_s, measured).apply(&q).map_err(own_error)
+    }
+
     /// The estimate of a frame for controls that are known, one for each that is sought: nothing is searched.
     ///
     /// # Errors
@@ -207,7 +232,7 @@ impl<'m> Fit<'m> {
         if self.free_head {
             let mesh = self.solver.model().mesh();
             let rest: Vec<[f64; 3]> = measured.iter().map(|m| mesh.position(self.markers[m.marker].point)).collect();
-            if free_head::nearest(&rest, &measured).is_none() {
+            if free_head::nearest(&rest, &measured, Loss::Quadratic).is_none() {
                 return Err(Error::HeadNotSeen { frame, time_s, markers: measured.len() });
             }
         }
@@ -226,9 +251,19 @@ impl<'m> Fit<'m> {
         let q: Vec<f64> = self.unknowns.iter().map(|k| optimum.equilibrium.state.controls[*k]).collect();
         let aims = Aims { objectives: &self.objectives, time_s, before: &self.before };
         let (gradient, _) = aims.model(&q, &optimum.residuals, &optimum.jacobian);
-        let information = self.objectives.loss.model(&optimum.residuals, &optimum.jacobian).1;
+        let mut information = self.objectives.loss.model(&optimum.residuals, &optimum.jacobian).1;
         let (prior, costs) = (aims.prior(&q), aims.values(&q, &optimum.residuals));
-        let (bounds, sd, variance) = self.uncertainty(&optimum, &(&information + &prior));
+        let response = &information + &prior - aims.tied(&q);
+        let (bounds, mut sd, variance) = self.uncertainty(&optimum, &(&information + &prior));
+        if let (Some(error), Some(variance)) = (HeadError::of(recording, frame), variance.filter(|v| *v > 0.0)) {
+            let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
+            let across = error.across(self.objectives.loss, (&optimum).into(), &measured);
+            let whole = (error.own + error.common) / variance;
+            information -= taken(&(&information + &prior), &across, &whole, &sought);
+            for (k, unit) in self.unknowns.iter().zip(standard_deviations(&(&information + &prior), &sought)) {
+                sd[*k] = unit.map(|unit| unit * variance.sqrt());
+            }
+        }
         (self.last, self.directions) = (optimum.equilibrium, optimum.directions);
 
         let model = self.solver.model();
@@ -236,11 +271,13 @@ impl<'m> Fit<'m> {
         let positions_mm: Vec<[f64; 3]> =
             self.markers.iter().map(|m| model.mesh().interpolate(m.point, &x)).collect();
         let shown: Vec<[f64; 3]> = measured.iter().map(|m| positions_mm[m.marker]).collect();
-        let back = if self.free_head { free_head::nearest(&shown, &measured) } else { None };
+        let loss = self.objectives.loss;
+        let back = if self.free_head { free_head::nearest(&shown, &measured, loss) } else { None };
         let head = back.zip(optimum.held_head).map(|(back, held)| {
             measured_mm.iter_mut().flatten().for_each(|z| *z = back.place(*z));
             let sought: Vec<Bound> = self.unknowns.iter().map(|k| bounds[*k]).collect();
-            free_head::describe(&back, &measured, &held, &sought, variance)
+            let rho = free_head::weights(&shown, &measured, &back, loss);
+            free_head::describe(&back, (&measured, &rho), &held, &sought, variance)
         });
         let pairs = positions_mm.iter().zip(&measured_mm);
         let distances: Vec<f64> = pairs.filter_map(|(x, z)| z.map(|z| norm(subtract(*x, z)))).collect();
@@ -257,6 +294,7 @@ impl<'m> Fit<'m> {
             iterations: optimum.iterations,
             information,
             prior,
+            response,
             gradient,
             weights: self.objectives.loss.weights(&optimum.residuals),
             costs,

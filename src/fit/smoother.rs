@@ -7,6 +7,8 @@
 //! per frame. Elimination of the chain from both ends gives what all frames together say of each ([`BlockTridiagonal`]).
 //! A frame that has failed has no markers here: smoothness bridges it.
 
+mod heads;
+
 use super::bounded_step::bounded_step_in_chain;
 use super::covariance::{Bound, standard_deviations};
 use super::estimate::{Estimate, FitIteration, Optimum};
@@ -313,6 +315,8 @@ impl<'m> Fit<'m> {
         let sizes: Vec<f64> = self.objectives.sizes().collect();
         let free: Vec<bool> = nodes.iter().flat_map(|node| node.a.iter().map(|a| *a > 0.0 && *a < 1.0)).collect();
         let marginals = hessian.marginals(&free).ok_or(Error::StepNotSolved { status: "NotPositive" })?;
+        let heads = self.head_errors(recording, &nodes, (chain, hessian), &free, &sizes);
+        let heads = heads.ok_or(Error::StepNotSolved { status: "NotPositive" })?;
         let tied: Vec<f64> = nodes.iter().enumerate().map(|(t, _)| own_share(links, &nodes, t)).collect();
         let mut frames = Vec::with_capacity(nodes.len());
         let mut near: Option<Equilibrium> = fitted.iter().flatten().next().map(|first| first.equilibrium.clone());
@@ -342,8 +346,10 @@ impl<'m> Fit<'m> {
             };
             near = Some(at.equilibrium.clone());
             let own = &free[t * n..(t + 1) * n];
-            let marginal =
-                chain.marginal(t, &marginals, &free).ok_or(Error::StepNotSolved { status: "NotPositive" })?;
+            let marginal = match &heads {
+                Some(heads) => heads[t].clone(),
+                None => chain.marginal(t, &marginals, &free).ok_or(Error::StepNotSolved { status: "NotPositive" })?,
+            };
             let marginal = DMatrix::from_fn(n, n, |a, b| marginal[(a, b)] / (sizes[a] * sizes[b]));
             let iterations = fitted[t].as_ref().map_or_else(Vec::new, |estimate| estimate.iterations.clone());
             let cost = 0.5 * at.residuals.iter().map(|r| r * r).sum::<f64>();

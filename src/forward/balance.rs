@@ -21,6 +21,9 @@ const TANGENT_TOLERANCE: f64 = 1e-13;
 /// What of B x may remain of the B x without constraint forces, and the iterations for it.
 const CONSTRAINT_TOLERANCE: f64 = 1e-9;
 const CONSTRAINT_ITERATIONS: usize = 500;
+/// Right-hand sides for which a stale factor is worth trying: a sweep for 40 of them takes as long as a factorisation, and a
+/// stale factor takes several more sweeps than a new one.
+const STALE_COLUMNS: usize = 12;
 /// Sweeps after which a stale factor is not worth keeping.
 const STALE_SWEEPS: usize = 12;
 
@@ -312,7 +315,7 @@ impl<'m> Balance<'m> {
     fn solve_assembled(&mut self, rhs: &mut [f64], columns: usize) -> Result<()> {
         let original = rhs.to_vec();
         let same = Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern());
-        if self.factored && same {
+        if self.factored && same && columns <= STALE_COLUMNS {
             let quality = self.factor.solve(&self.tangent.matrix, rhs, columns, TANGENT_TOLERANCE)?;
             if quality.residual <= TANGENT_REQUIRED && quality.sweeps <= STALE_SWEEPS {
                 return Ok(());

@@ -32,5 +32,5 @@ pub use health::{Clock, Gap, Health, LabelHealth, Warning};
 pub use inspect::{Contents, Extent, Inspection, MarkerTopic, inspect, inspect_bytes};
 pub use pose::{Poses, read_poses, read_poses_bytes};
 pub use read::{ReadOptions, read, read_bytes};
-pub use recording::{Frame, Recording, Source};
+pub use recording::{BoneNoise, Frame, Recording, Source};
 pub use write::{Compression, WriteOptions, write_json};

@@ -275,7 +275,7 @@ fn recording(
         labels: label_health,
         warnings,
     };
-    Recording { source, labels, frames, health }
+    Recording { source, labels, frames, health, bones: None }
 }
 
 /// One clock for the whole recording: the stamp in the message if every message has one, else publish time, else log

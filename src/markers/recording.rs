@@ -21,6 +21,19 @@ pub struct Recording {
     pub frames: Vec<Frame>,
     /// What is known about its quality.
     pub health: Health,
+    /// How noisy the bone markers were with which a motion of the head was taken out, if it was.
+    pub bones: Option<BoneNoise>,
+}
+
+/// Markers on bone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoneNoise {
+    /// Variance of a coordinate, mm2, as their distances from a rigid head estimate it.
+    pub variance_mm2: f64,
+    /// Where each of them is in the neutral frame, mm; `None` for one that it does not show.
+    pub neutral_mm: Vec<Option<[f64; 3]>>,
+    /// Of every frame those that counted.
+    pub shown: Vec<Vec<usize>>,
 }
 
 /// All markers at one time.

@@ -1,6 +1,7 @@
 //! From a scene to a model: every table of the problem file becomes a mesh, a term or a support.
 
 use super::bones::{attachments, bone, bones};
+use super::fibre_turn::turned;
 use super::supports::{Conflict, Support, Supports, normal_axis};
 use super::tissue::{Host, tissue};
 use super::{Control, Ingredients, Model};
@@ -251,6 +252,7 @@ pub fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warni
         GeometrySpec::FaceMuscle(FaceMuscleSpec { name, side, face }) => {
             let course = face.muscle(name).unwrap_or_else(|| unreachable!("checked by the scene"));
             let (mesh, angles) = course.mesh(&face.sheet, *side);
+            let angles = turned(&mesh, angles, spec.fibre_turn_deg);
             return Ok((mesh, angles, None));
         }
         GeometrySpec::Face(_) => unreachable!("no muscle is read as a face"),
@@ -277,6 +279,7 @@ pub fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warni
         },
     };
     let warning = file.and_then(|(_, geometry)| geometry.warning(&spec.place));
+    let angles = turned(&mesh, angles, spec.fibre_turn_deg);
     Ok((mesh, angles, warning))
 }
 

@@ -4,6 +4,7 @@ mod assembly;
 mod bones;
 pub mod build;
 mod constraints;
+mod fibre_turn;
 pub mod halved;
 mod numbering;
 mod signs;

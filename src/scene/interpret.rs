@@ -7,6 +7,7 @@ use super::cursor::{FINITE, Item, Mistakes, NOT_NEGATIVE, PART, POSITIVE, Reader
 use super::face;
 use super::nearest::nearest;
 use super::objectives;
+use super::outer;
 use super::references::References;
 use super::registration::{self, MOST_FRAMES};
 use super::spec::*;
@@ -56,7 +57,9 @@ pub(super) fn scene(root: &Node, name: &str, references: &References, mistakes: 
         }
         if let (Some(Some(fit)), Some(markers), true) = (&fit, &markers, fitting) {
             objectives::need_deviations(fit, markers, mistakes);
-            objectives::agree_with_head(fit, mistakes);
+            if let (Some(muscles), Some(regions)) = (&muscles, &regions) {
+                outer::check(fit, (muscles, regions), markers, mistakes);
+            }
         }
         let solver = file.or("solver", SolverSpec::default(), |item| item.table(solver));
         let output = file.or("output", OutputSpec::default(), |item| item.table(output));
@@ -299,6 +302,12 @@ pub(super) fn muscle(table: &mut Table, references: &References, host: Option<&M
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
     let cut = table.or("cut", false, |item| item.flag());
     let taper_mm = table.optional("taper_mm", |item| item.number(POSITIVE));
+    let fibre_turn_deg = table.or("fibre_turn_deg", [0.0; 4], |item| {
+        let angles = item.list("a list of 4 numbers", |entry| entry.number(FINITE))?;
+        let count = angles.len();
+        let four = angles.try_into().ok();
+        four.or_else(|| item.wrong_length(&format!("{count} entries"), "4 (everywhere, along x, along y, along z)"))
+    });
     let example = "blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }";
     let blemker = table.required("blemker", example, |item| item.table(blemker));
     Some(MuscleSpec {
@@ -310,6 +319,7 @@ pub(super) fn muscle(table: &mut Table, references: &References, host: Option<&M
         gauss: gauss?,
         cut: cut?,
         taper_mm: taper_mm?,
+        fibre_turn_deg: fibre_turn_deg?,
         blemker: blemker?,
         place: table.place(),
     })
@@ -535,6 +545,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let allow_unchecked = table.or("allow_unchecked", false, |item| item.flag());
     let sd_mm = table.optional("sd_mm", |item| item.number(POSITIVE));
     let objectives = objectives::objectives(table, references, unknowns.as_deref());
+    let outer = table.optional("outer", |item| item.table(outer::outer));
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let frames_place = table.place_of("frames");
@@ -554,6 +565,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         allow_unchecked: allow_unchecked?,
         sd_mm: sd_mm?,
         objectives: objectives?,
+        outer: outer?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
         registration: registration?,

@@ -4,6 +4,7 @@
 
 use super::Scene;
 use super::objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
+use super::outer::{OuterSpec, OuterUnknown, OuterWhat};
 use super::spec::*;
 use super::units::Units;
 
@@ -205,8 +206,19 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
 }
 
 fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
-    let MuscleSpec { name, geometry: shape, element, fibres, activation, gauss, cut, taper_mm, blemker, place: _ } =
-        muscle;
+    let MuscleSpec {
+        name,
+        geometry: shape,
+        element,
+        fibres,
+        activation,
+        gauss,
+        cut,
+        taper_mm,
+        fibre_turn_deg,
+        blemker,
+        place: _,
+    } = muscle;
     let activation = match activation {
         ActivationSpec::Uniform => "uniform",
         ActivationSpec::Field => "field",
@@ -229,6 +241,9 @@ fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
     });
     lines.extend([format!("activation = \"{activation}\""), format!("gauss = {gauss}"), format!("cut = {cut}")]);
     lines.extend(taper_mm.map(|taper| format!("taper_mm = {}", number(taper))));
+    if *fibre_turn_deg != [0.0; 4] {
+        lines.push(format!("fibre_turn_deg = [{}]", fibre_turn_deg.map(number).join(", ")));
+    }
     lines.extend([format!(
         "blemker = {{ sigma_max_kpa = {}, lambda_star = {}, lambda_ofl = {}, p1 = {}, p2 = {} }}",
         number(*sigma_max_kpa),
@@ -425,6 +440,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         allow_unchecked,
         sd_mm,
         objectives,
+        outer,
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
         registration:
@@ -483,8 +499,37 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         HeadSpec::Estimate => lines.extend(["\n[fit.head]".into(), "estimate = true".into()]),
         HeadSpec::PoseTopic(topic) => lines.extend(["\n[fit.head]".into(), format!("pose_topic = {}", text(topic))]),
     }
+    if let Some(outer) = outer {
+        outer_lines(outer, lines);
+    }
     for PriorSpec { csv, sd, gain, delay_s } in &objectives.priors {
         lines.extend(["\n[[fit.prior]]".into(), format!("csv = {}", path(csv)), format!("sd = {}", number(*sd))]);
         lines.extend([format!("gain = {}", number(*gain)), format!("delay_s = {}", number(*delay_s))]);
+    }
+}
+
+fn outer_lines(outer: &OuterSpec, lines: &mut Vec<String>) {
+    let OuterSpec { unknowns, frames, held_out, tolerance, max_iterations, place: _ } = outer;
+    let list = |frames: &[usize]| frames.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    lines.push("\n[fit.outer]".into());
+    lines.extend(frames.as_ref().map(|frames| format!("frames = [{}]", list(frames))));
+    if !held_out.is_empty() {
+        lines.push(format!("held_out = [{}]", list(held_out)));
+    }
+    lines.extend([format!("tolerance = {}", number(*tolerance)), format!("max_iterations = {max_iterations}")]);
+    for OuterUnknown { what, sd, bounds: [lower, upper], place: _ } in unknowns {
+        lines.push("\n[[fit.outer.unknown]]".into());
+        match what {
+            OuterWhat::Stiffness(region) => {
+                lines.push(format!("stiffness = {}", text(region.as_deref().unwrap_or("tissue"))));
+            }
+            OuterWhat::SigmaMax(muscle) => lines.push(format!("sigma_max = {}", text(muscle))),
+            OuterWhat::FibreAngle(muscle, mode) => {
+                lines.extend([format!("fibre_angle = {}", text(muscle)), format!("mode = \"{}\"", mode.word())]);
+            }
+        }
+        let unit = if what.is_factor() { "" } else { "_deg" };
+        lines.extend(sd.map(|sd| format!("sd{unit} = {}", number(sd))));
+        lines.push(format!("bounds{unit} = [{}, {}]", number(*lower), number(*upper)));
     }
 }

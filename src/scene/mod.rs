@@ -18,6 +18,7 @@ mod interpret;
 mod lock;
 mod nearest;
 mod objectives;
+mod outer;
 mod overrides;
 mod references;
 mod registration;
@@ -32,6 +33,7 @@ pub use fibres::{
     AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
 };
 pub use objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
+pub use outer::{AngleMode, OuterSpec, OuterUnknown, OuterWhat};
 pub use references::expected_ranges;
 pub use spec::*;
 pub use study::{Change, Design, Factor, Level, Measure, ReferenceSpec, Study, VariantSpec};

@@ -2,7 +2,7 @@
 
 use super::cursor::{FINITE, Item, Mistakes, POSITIVE, Range, Reader, Table};
 use super::references::References;
-use super::spec::{FitSpec, HeadSpec, MarkerSpec};
+use super::spec::{FitSpec, MarkerSpec};
 use super::tree::Value;
 use crate::error::Error;
 use serde::Serialize;
@@ -205,18 +205,6 @@ pub(super) fn need_deviations(fit: &FitSpec, markers: &[MarkerSpec], mistakes: &
                  example:\nsd_mm = 0.3"
             ),
             place: fit.place.clone(),
-        });
-    }
-}
-
-/// Notes if a robust loss stands beside a head that is estimated: the head is a fit by squares, in which outliers count in full.
-pub(super) fn agree_with_head(fit: &FitSpec, mistakes: &Mistakes) {
-    if fit.registration.head == HeadSpec::Estimate && fit.objectives.loss != MarkerLossSpec::Quadratic {
-        mistakes.add(Error::NotInThisVersion {
-            key: "fit.loss".into(),
-            what: "a robust loss while the head is estimated from the skin markers",
-            instead: "write loss = \"quadratic\", or find the head by bone markers or a topic of poses".into(),
-            place: fit.registration.head_place.clone(),
         });
     }
 }

@@ -4,6 +4,7 @@
 //! absolute. What needs geometry (is the muscle inside its host?) is asked later, and points back through `place`.
 
 use super::objectives::ObjectivesSpec;
+use super::outer::OuterSpec;
 use super::units::Units;
 use crate::error::Place;
 use crate::math::factor::Precision;
@@ -231,6 +232,9 @@ pub struct MuscleSpec {
     pub cut: bool,
     /// The length over which fibres end one after the other, mm.
     pub taper_mm: Option<f64>,
+    /// Degrees that are added to the fibre angle A: the same everywhere, then from minus to plus so many along x, y and z from
+    /// one side to the other of the box around the mesh.
+    pub fibre_turn_deg: [f64; 4],
     /// The constants of its force-stretch law.
     pub blemker: BlemkerSpec,
     /// The table in the file.
@@ -793,6 +797,8 @@ pub struct FitSpec {
     pub sd_mm: Option<f64>,
     /// What is minimised.
     pub objectives: ObjectivesSpec,
+    /// What all frames share and is found too: `[fit.outer]`.
+    pub outer: Option<OuterSpec>,
     /// A marker further than this from the surface of the model is a mistake, mm.
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.

@@ -1,7 +1,7 @@
 //! One solve of a problem in memory: what it found, in which time, with what work. Nothing is written.
 
 use super::norms::Seen;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fit::placement::Marker;
 use crate::fit::recording::{chosen_frames, poses, read};
 use crate::fit::sequence::settings;
@@ -68,6 +68,15 @@ impl Prepared {
     /// Every mistake in the changed problem.
     pub fn read(path: &Path, change: &Change) -> Result<Prepared> {
         let scene = Scene::read_changed(path, &change.set, &change.without)?;
+        if let Some(outer) = scene.fit.as_ref().and_then(|fit| fit.outer.as_ref()).filter(|_| scene.task == Task::Fit)
+        {
+            return Err(Error::NotInThisVersion {
+                key: "fit.outer".into(),
+                what: "a study of what all frames share",
+                instead: "run the problem, and write what was found into it".into(),
+                place: outer.place.clone(),
+            });
+        }
         let start = Instant::now();
         let built = build(&scene)?;
         let build_seconds = start.elapsed().as_secs_f64();

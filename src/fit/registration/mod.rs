@@ -119,6 +119,10 @@ pub fn register(
         for position in recording.frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()) {
             *position = registration.motion.place(*position);
         }
+        if let Some(bones) = &mut recording.bones {
+            bones.neutral_mm.iter_mut().flatten().for_each(|x| *x = registration.motion.place(*x));
+            bones.variance_mm2 *= registration.motion.scale * registration.motion.scale;
+        }
     }
     Ok((registration, std::mem::take(warnings)))
 }

@@ -49,6 +49,7 @@ stored!(Estimate {
     costs,
     information,
     prior,
+    response,
     gradient,
     variance,
     bridged,

@@ -4,6 +4,7 @@ mod fit;
 mod forward;
 mod marker_errors;
 mod mesh_errors;
+mod outer;
 mod outliers;
 mod told;
 
@@ -11,6 +12,7 @@ pub use fit::{FitSummary, FittedFrame};
 pub use forward::ForwardSummary;
 pub use marker_errors::{ErrorsOf, MarkerErrors};
 pub use mesh_errors::MeshErrors;
+pub use outer::{outer_page, outer_warnings};
 pub use outliers::Outliers;
 pub use told::ToldSummary;
 

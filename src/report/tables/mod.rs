@@ -16,6 +16,7 @@ mod identifiability;
 mod markers;
 mod muscles;
 mod objectives;
+mod outer;
 mod probes;
 mod registration;
 
@@ -32,6 +33,7 @@ pub use identifiability::{IdentifiabilityTables, advice_table};
 pub use markers::MarkerTable;
 pub use muscles::MuscleTable;
 pub use objectives::{ObjectiveTable, OutlierTable};
+pub use outer::write_outer;
 pub use probes::ProbeTable;
 pub use registration::{Placement, write_registration};
 

@@ -21,9 +21,14 @@ use std::collections::HashMap;
 /// How far a patch goes on beyond an edge of the whole set, in element lengths.
 const BEYOND: f64 = 1.0;
 
+/// Parts of a patch along each direction, each with a box of its own: a point near the surface then lies in the boxes of few
+/// patches.
+const PARTS: usize = 4;
+
 /// A surface of bicubic patches.
 pub struct Patches {
     patches: Vec<Patch>,
+    /// Boxes of the parts with their patch.
     tree: RTree<GeomWithData<Rectangle<Vector>, usize>>,
     sign: f64,
 }
@@ -54,8 +59,11 @@ impl Patches {
     }
 
     fn of(patches: Vec<Patch>, sign: f64) -> Patches {
-        let bounds = |(index, patch): (usize, &Patch)| GeomWithData::new(patch.bounds(), index);
-        let boxes = patches.iter().enumerate().map(bounds);
+        let ends = |k: usize| [k, k + 1].map(|k| k as f64 / PARTS as f64);
+        let boxes = patches.iter().enumerate().flat_map(|(index, patch)| {
+            (0..PARTS * PARTS)
+                .map(move |k| GeomWithData::new(patch.over(ends(k % PARTS), ends(k / PARTS)).bounds(), index))
+        });
         Patches { tree: RTree::bulk_load(boxes.collect()), patches, sign }
     }
 }
@@ -77,10 +85,15 @@ impl RigidSurface for Patches {
         }
         // over the patches in order of the distance of their boxes, until no box can be nearer than what was found
         let mut best: Option<(Foot, f64)> = None;
+        let mut seen: Vec<usize> = Vec::new();
         for candidate in self.tree.nearest_neighbor_iter(x) {
             if best.as_ref().is_some_and(|(foot, _)| candidate.geom().distance_2(&x).sqrt() > foot.distance) {
                 break;
             }
+            if seen.contains(&candidate.data) {
+                continue;
+            }
+            seen.push(candidate.data);
             let patch = &self.patches[candidate.data];
             let foot = patch.closest(x);
             if best.as_ref().is_none_or(|(b, _)| foot.distance < b.distance) {

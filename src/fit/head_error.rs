@@ -1,0 +1,124 @@
+//! What is not known of a head that was found from bone markers, and what that takes from the controls.
+//!
+//! The head was taken out of the recording with a motion that is off by a small turn and shift h. h has the covariance
+//!   C = C_t + C_0,   C = s^2 (H_b^T H_b)^-1
+//! of the bone markers in the frame, and of those in the neutral frame, which is the same for all frames; s is the standard
+//! deviation of one of their coordinates, H_b = d(position)/dh. Controls that are fitted with the information A have, with H of
+//! the skin markers and G = J^T W H, the covariance
+//!   A^-1 + A^-1 G C G^T A^-1 = (A - G K G^T)^-1,   K = (C^-1 + G^T A^-1 G)^-1
+
+use super::covariance::{Bound, SymmetricInverse};
+use super::estimate::Optimum;
+use super::frame::Measured;
+use super::head::middle;
+use super::objective::loss::Loss;
+use crate::markers::{BoneNoise, Recording};
+use crate::math::tensor::subtract;
+use nalgebra::{DMatrix, Matrix6};
+
+/// A smaller variance of bone markers is rounding, mm2.
+const ROUNDING: f64 = 1e-12;
+
+/// The error of the head in a frame, about the centre of the bone markers: turn, rad, and shift, mm.
+pub(super) struct HeadError {
+    /// C_t.
+    pub own: Matrix6<f64>,
+    /// C_0.
+    pub common: Matrix6<f64>,
+    centre: [f64; 3],
+}
+
+impl HeadError {
+    /// Of a frame; `None` where the head was not found from bone markers, or without noise.
+    pub fn of(recording: &Recording, frame: usize) -> Option<HeadError> {
+        let BoneNoise { variance_mm2, neutral_mm, shown } = recording.bones.as_ref()?;
+        if *variance_mm2 < ROUNDING {
+            return None;
+        }
+        let centre = middle(neutral_mm);
+        let covariance = |bones: &mut dyn Iterator<Item = [f64; 3]>| {
+            let mut information = Matrix6::zeros();
+            for h in bones.map(|x| by_head(x, centre)) {
+                information += h.transpose() * h;
+            }
+            Some(information.cholesky()?.inverse() * *variance_mm2)
+        };
+        let own = covariance(&mut shown.get(frame)?.iter().filter_map(|bone| neutral_mm[*bone]))?;
+        let common = covariance(&mut neutral_mm.iter().flatten().copied())?;
+        Some(HeadError { own, common, centre })
+    }
+
+    /// G of a frame: a row for every control that is sought.
+    pub fn across(&self, loss: Loss, optimum: Seen<'_>, measured: &[Measured]) -> DMatrix<f64> {
+        let Seen { residuals, jacobian } = optimum;
+        let n = jacobian.ncols();
+        let mut both = DMatrix::zeros(jacobian.nrows(), n + 6);
+        both.columns_mut(0, n).copy_from(jacobian);
+        for (k, m) in measured.iter().enumerate() {
+            let h = by_head(m.position, self.centre) * m.weight;
+            both.view_mut((3 * k, n), (3, 6)).copy_from(&h);
+        }
+        loss.model(residuals, &both).1.view((0, n), (n, 6)).into_owned()
+    }
+}
+
+/// Residuals of a frame with their derivative.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub residuals: &'a [f64],
+    pub jacobian: &'a DMatrix<f64>,
+}
+
+impl<'a> From<&'a Optimum> for Seen<'a> {
+    fn from(optimum: &'a Optimum) -> Seen<'a> {
+        Seen { residuals: &optimum.residuals, jacobian: &optimum.jacobian }
+    }
+}
+
+/// d(position)/dh at a place: by a turn about `centre`, then by a shift.
+fn by_head(place: [f64; 3], centre: [f64; 3]) -> nalgebra::Matrix3x6<f64> {
+    let [x, y, z] = subtract(place, centre);
+    nalgebra::Matrix3x6::from_row_slice(&[
+        0.0, z, -y, 1.0, 0.0, 0.0, //
+        -z, 0.0, x, 0.0, 1.0, 0.0, //
+        y, -x, 0.0, 0.0, 0.0, 1.0,
+    ])
+}
+
+/// G K G^T: what an error of the head with the covariance `error`, in units of that of a weighted residual, takes from the
+/// information `whole` on controls of which some are free.
+pub(super) fn taken(
+    whole: &DMatrix<f64>,
+    across: &DMatrix<f64>,
+    error: &Matrix6<f64>,
+    bounds: &[Bound],
+) -> DMatrix<f64> {
+    let free: Vec<usize> = (0..bounds.len()).filter(|k| bounds[*k] == Bound::Free).collect();
+    let inverse = SymmetricInverse::new(&whole.select_rows(&free).select_columns(&free)).matrix();
+    let own = across.select_rows(&free);
+    let Some(error) = error.cholesky().map(|factor| factor.inverse()) else {
+        return DMatrix::zeros(bounds.len(), bounds.len());
+    };
+    let known = own.transpose() * inverse * own + DMatrix::from_fn(6, 6, |a, b| error[(a, b)]);
+    let k = SymmetricInverse::new(&known).matrix();
+    across * k * across.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_leaves_the_covariance_of_both_errors() {
+        let entry = |a: usize, b: usize| ((3 * a + 5 * b + a * b) as f64).sin();
+        let whole = DMatrix::from_fn(3, 3, |a, b| if a == b { 30.0 } else { 4.0 * entry(a.min(b), a.max(b)) });
+        let across = DMatrix::from_fn(3, 6, |a, b| 20.0 * entry(a, b + 2));
+        let root = Matrix6::from_fn(|a, b| if a == b { 0.2 } else { 0.02 * entry(a, b) });
+        let error = root * root.transpose();
+        let left = &whole - taken(&whole, &across, &error, &[Bound::Free; 3]);
+        let inverse = whole.try_inverse().expect("regular");
+        let dynamic = DMatrix::from_fn(6, 6, |a, b| error[(a, b)]);
+        let expected = &inverse + &inverse * &across * dynamic * across.transpose() * &inverse;
+        assert!((left.try_inverse().expect("regular") - &expected).amax() < 1e-10 * expected.amax());
+    }
+}
