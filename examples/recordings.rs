@@ -138,7 +138,8 @@ fn make(recording: &Recording) -> Result<(), Box<dyn Error>> {
     for k in 0..recording.frames {
         let time_s = k as f64 / recording.rate_hz;
         let t = k as f64 / (recording.frames - 1) as f64;
-        let controls: Vec<f64> = muscles.iter().enumerate().map(|(k, name)| (recording.activation)(k, name, t)).collect();
+        let controls: Vec<f64> =
+            muscles.iter().enumerate().map(|(k, name)| (recording.activation)(k, name, t)).collect();
         let [turn, shift] = (recording.head)(t);
         let turn = Rotation3::new(turn.into());
         writeln!(truth, "{k},{time_s},{}", controls.iter().map(f64::to_string).collect::<Vec<_>>().join(","))?;

@@ -159,7 +159,8 @@ fn without_arguments_the_built_in_face_is_fitted() {
     assert_eq!(json(&folder, "runs/face-0001/status.json")["frames_ok"], 1);
     assert_eq!(json(&folder, "runs/face-0001/manifest.json")["threads"], 1);
     let activations = text(&folder, "runs/face-0001/tables/activations.csv");
-    let row: Vec<f64> = activations.lines().nth(1).unwrap().split(',').skip(2).take(30).map(|a| a.parse().unwrap()).collect();
+    let row: Vec<f64> =
+        activations.lines().nth(1).unwrap().split(',').skip(2).take(30).map(|a| a.parse().unwrap()).collect();
     assert!(row.len() == 30 && row.iter().all(|a| (0.0..=0.01).contains(a)), "it is at rest: {activations}");
     // its lock file names the copy of the recording
     let page = stdout(&folder, &["check", "runs/face-0001/problem.lock.toml"], 0);
@@ -617,6 +618,6 @@ fn every_template_is_a_problem() {
         let again = stderr(&folder, &["new", name, "--template", name], 6);
         assert!(again.contains("error[O001]") && again.contains("it is there already"), "{again}");
     }
-    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", THREE_FRAMES[0], THREE_FRAMES[1]], 0);
+    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", "--set", "fit.frames={first=0,last=2}"], 0);
     stdout(&folder, &["run", "-q", "fibres/problem.toml", "--out", "b"], 0);
 }

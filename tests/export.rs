@@ -26,7 +26,8 @@ fn run() -> &'static Path {
     let folder = RUN.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("run").display().to_string();
-        let (exit, _, stderr) = risorius(&["run", BEAM, "--set", "fit.frames={first=0,last=30,step=10}", "--out", &run]);
+        let (exit, _, stderr) =
+            risorius(&["run", BEAM, "--set", "fit.frames={first=0,last=30,step=10}", "--out", &run]);
         assert_eq!(exit, 0, "{stderr}");
         let (exit, stdout, stderr) = risorius(&["export", &run, "--to", "glb,mcap,sto,exf,obj,ply"]);
         assert!(exit == 0 && stderr.is_empty() && stdout.contains("result.glb ("), "{stdout}{stderr}");

@@ -88,7 +88,8 @@ fn a_fit_leaves_its_page() {
 #[test]
 fn what_the_markers_can_and_cannot_tell_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let (exit, ..) = risorius(folder.path(), &["run", BEAM, "--set", "fit.frames={first=10,last=10}", "--out", "run"]);
+    let (exit, ..) =
+        risorius(folder.path(), &["run", BEAM, "--set", "fit.frames={first=10,last=10}", "--out", "run"]);
     assert_eq!(exit, 0);
     let tables = folder.path().join("run/tables");
     let page = || {
@@ -153,8 +154,16 @@ fn what_the_markers_can_and_cannot_tell_is_said() {
 #[test]
 fn frames_that_failed_stand_first() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments =
-        ["run", BEAM, "--set", "fit.frames={first=0,last=10,step=10}", "--set", "fit.max_iterations=3", "--out", "run"];
+    let arguments = [
+        "run",
+        BEAM,
+        "--set",
+        "fit.frames={first=0,last=10,step=10}",
+        "--set",
+        "fit.max_iterations=3",
+        "--out",
+        "run",
+    ];
     let (exit, _, stderr) = risorius(folder.path(), &arguments);
     let status = fs::read_to_string(folder.path().join("run/status.json")).unwrap();
     assert!(exit == 4 && status.contains("\"partial\""), "the test needs one frame of each kind: {status} {stderr}");
