@@ -618,6 +618,6 @@ fn every_template_is_a_problem() {
         let again = stderr(&folder, &["new", name, "--template", name], 6);
         assert!(again.contains("error[O001]") && again.contains("it is there already"), "{again}");
     }
-    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", THREE_FRAMES[0], THREE_FRAMES[1]], 0);
+    stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", "--set", "fit.frames={first=0,last=2}"], 0);
     stdout(&folder, &["run", "-q", "fibres/problem.toml", "--out", "b"], 0);
 }

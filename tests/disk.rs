@@ -196,7 +196,8 @@ fn a_forward_run_on_a_full_disk_keeps_its_finished_frames() {
 /// Three frames of the built-in fit, and their recording.
 fn finished(folder: &Path) {
     risorius(folder, &["run", BEAM, "-q", "--set", "fit.frames={first=0,last=20,step=10}", "--out", "run"], 0);
-    fs::copy(folder.join("run/recording.mcap"), folder.join("take.mcap")).expect("copied");
+    let recording = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/beam.mcap");
+    fs::copy(recording, folder.join("take.mcap")).expect("copied");
 }
 
 #[test]
@@ -225,9 +226,7 @@ fn what_does_not_fit_on_a_disk_leaves_what_was_there() {
     let output = on_a_disk(
         folder,
         200,
-        &format!(
-            "cp take.mcap disk/; {FILL}; \"$RISORIUS\" markers convert --force run/recording.mcap disk/take.mcap"
-        ),
+        &format!("cp take.mcap disk/; {FILL}; \"$RISORIUS\" markers convert --force take.mcap disk/take.mcap"),
     );
     refused(&output.expect("mounted"), &["cannot write disk/take.mcap", NO_ROOM[0]]);
     assert!(
