@@ -1,4 +1,4 @@
-//! Likeness of left and right: sum over pairs <name>.L, <name>.R of (a_L - a_R)^2 / (2 sd^2).
+//! Likeness of left and right: sum over pairs `<name>.L`, `<name>.R` of (a_L - a_R)^2 / (2 sd^2).
 
 use super::{Instant, Objective, Sum};
 use crate::model::Model;

@@ -1,7 +1,7 @@
 //! Where a recording stands, before any solve: one motion of its neutral frame to the markers of the model at rest.
 //!
 //! The motion is rigid, or a similarity where the recording has no true size, and most markers decide it: a few that are off
-//! do not turn it ([`crate::math::motion::robust`]). What keeps the two apart is named ([`diagnosis`]), and nothing is
+//! do not turn it ([`crate::math::motion::robust`]). What keeps the two apart is named (`diagnosis`), and nothing is
 //! mended that was not asked for.
 
 mod diagnosis;
