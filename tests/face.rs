@@ -5,6 +5,7 @@ use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::fibre::Blemker;
 use risorius::math::tensor::{Vector, add_scaled, determinant, dot, norm, normalised, subtract};
 use risorius::mesh::element::ends;
+use risorius::mesh::face::Face;
 use risorius::mesh::facial::{BodySide, Course, FACES, Landmark, Options, host};
 use risorius::mesh::fibre_angles::FibreAngles;
 use risorius::mesh::location::Locator;
@@ -171,6 +172,15 @@ fn every_named_face_is_where_its_name_says() {
     assert_eq!((count("lip.upper"), count("lip.lower"), count("lid.upper.L"), count("lid.lower.R")), (6, 6, 4, 4));
     let parts = ["deep.perioral", "deep.nose", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
     assert_eq!(parts.iter().sum::<usize>(), 560, "{parts:?}");
+    // what lies on the jaw ends at the line between the lips
+    for part in ["deep.perioral", "deep.sliding"] {
+        let height = |face: &Face| whole.position(MaterialPoint { element: face.element, xi: [0.5, 0.5, 0.0] })[1];
+        let [jaw, skull] = ["jaw", "skull"].map(|bone| &whole.named_faces[&format!("{part}.{bone}")]);
+        assert_eq!(jaw.len() + skull.len(), count(part));
+        let mouth = |face: &&Face| (12..16).contains(&(face.element % 28));
+        assert!(jaw.iter().filter(mouth).all(|face| height(face) < landmark("cheilion").position[1]));
+        assert!(skull.iter().filter(mouth).all(|face| height(face) > landmark("cheilion").position[1]));
+    }
     // the margins of the lips are round: one above the other, 0.2 mm apart where they are nearest, which is within their
     // thickness, 4.4 mm at the back and 1.6 mm at the skin; at the corners they meet
     let (upper, lower) = (&whole.named_faces["lip.upper"], &whole.named_faces["lip.lower"]);

@@ -1,7 +1,7 @@
 //! One frame of a recording as a least-squares problem in the controls.
 
 use super::free_head;
-use super::gauss_newton::LeastSquares;
+use super::gauss_newton::{LeastSquares, Range};
 use super::objective::{Instant, Objective as _, Objectives, Past, Sum};
 use super::placement::Marker;
 use super::sensitivity::{Reuse, Sensitivity, rates_at, sensitivities};
@@ -229,12 +229,13 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             return Ok(self.residuals(inner, &inner.base));
         }
         let found = match &inner.directions {
-            // to first order the body moves along the sensitivities
+            // to first order in t the body moves along the sensitivities
             Some(directions) => {
                 let mut guess = inner.base.state.clone();
                 for (control, direction) in self.unknowns.iter().zip(&directions.columns) {
-                    let by = drive.controls[*control] - inner.base.state.controls[*control];
-                    inner.solver.model().advance(&mut guess, direction, by);
+                    let range = Range::of(&inner.solver.model().controls()[*control]);
+                    let (from, to) = (inner.base.state.controls[*control], drive.controls[*control]);
+                    inner.solver.model().advance(&mut guess, direction, range.even_change(from, to));
                 }
                 inner.solver.equilibrium_near(&guess, &inner.base.state, &drive)?
             }

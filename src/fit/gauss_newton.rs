@@ -7,6 +7,7 @@
 
 use super::bounded_step::bounded_step;
 use crate::error::Error;
+use crate::model::Control;
 use argmin::core::{
     Error as ArgminError, IterState, Jacobian, KV, Operator, Problem, Solver, State, TerminationReason,
     TerminationStatus,
@@ -29,6 +30,16 @@ pub struct Range {
 }
 
 impl Range {
+    /// The range of a control.
+    pub fn of(control: &Control) -> Range {
+        Range { lower: control.lower, upper: control.upper, onset: control.onset }
+    }
+
+    /// dq/dt at `from` times the change of t on the way to `to`: how far a body goes whose response is even in t, in units of dx/dq.
+    pub fn even_change(&self, from: f64, to: f64) -> f64 {
+        (from - self.lower + self.onset) * (self.to_even(to) - self.to_even(from))
+    }
+
     fn to_even(self, q: f64) -> f64 {
         ((q - self.lower) / self.onset).ln_1p()
     }

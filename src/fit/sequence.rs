@@ -328,11 +328,7 @@ impl<'m> Fit<'m> {
     /// Runs the Gauss-Newton iteration of a frame through argmin's executor.
     fn optimise(&mut self, frame: usize, time_s: f64, measured: Vec<Measured>) -> Result<Optimum> {
         let model = self.solver.model();
-        let range = |k: &usize| {
-            let control = &model.controls()[*k];
-            Range { lower: control.lower, upper: control.upper, onset: control.onset }
-        };
-        let ranges = self.unknowns.iter().map(range).collect();
+        let ranges = self.unknowns.iter().map(|k| Range::of(&model.controls()[*k])).collect();
         let start: Vec<f64> = self.unknowns.iter().map(|k| self.last.state.controls[*k]).collect();
         let log = Log::default();
         let (tolerance, reuse) = (self.tolerance, self.reuse);

@@ -24,6 +24,11 @@ pub use work::Work;
 const FIRST_STEP: f64 = 0.5;
 /// A Newton step that must be damped below this is left for a shorter step of the path.
 const DAMPING: f64 = 0.1;
+/// What Newton's method does where nothing else is said.
+const LIMITS: Limits = Limits { iterations: 30, damping: DAMPING, test: Test::Monotone, otherwise: None };
+/// Residual, in relation to the element forces, of the states on the way to the equilibrium that is asked for: each is no more than
+/// the guess for the next.
+const ON_THE_WAY: f64 = 1e-3;
 /// Corrections with the tangent at hand before a new one is made.
 const CHORD_ITERATIONS: usize = 8;
 /// Iterations that a guess is given before the path is walked instead.
@@ -50,7 +55,7 @@ pub struct Drive {
 /// How equilibria are sought.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Residual in relation to the element forces.
+    /// Residual in relation to the element forces, at the end of a path.
     pub tolerance: f64,
     /// Newton iterations for each step of the path.
     pub max_iterations: usize,
@@ -200,7 +205,7 @@ impl<'m> Solver<'m> {
         self.balance.set_target(to.clone());
         let guess = self.balance.carried(self.balance.at_target(guess.clone()));
         if self.balance.has_tangent() {
-            let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
+            let limits = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, ..LIMITS };
             if let Ok(Some(outcome)) = chord(&mut self.balance, guess.clone(), limits) {
                 let history = vec![step(1.0, StepKind::Walked, outcome.last, outcome.iterations)];
                 if let Ok(found) = self.close_gaps(outcome.state, history, Vec::new()) {
@@ -208,11 +213,7 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        let limits = Limits {
-            iterations: self.settings.max_iterations.min(NEAR_ITERATIONS),
-            damping: DAMPING,
-            test: Test::Monotone,
-        };
+        let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), ..LIMITS };
         if let Ok(outcome) = self.solve(guess, limits) {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {
@@ -239,9 +240,11 @@ impl<'m> Solver<'m> {
         let mut last = from.clone();
         let mut before: Option<(f64, State)> = None;
         let mut modes = 0;
-        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
+            let tolerance = self.settings.tolerance;
+            self.balance.tolerance = if place < 1.0 { tolerance.max(ON_THE_WAY) } else { tolerance };
             let guess = match &before {
                 Some((earlier, state)) => {
                     let ratio = (place - stepper.reached()) / (stepper.reached() - earlier);
@@ -253,7 +256,7 @@ impl<'m> Solver<'m> {
             let outcome = match self.attempt(guess, &last, limits) {
                 Ok(outcome) => outcome,
                 Err(error) => {
-                    let (reached, last_good) = (stepper.reached(), last.clone());
+                    let (reached, last_good) = (stepper.reached(), self.balanced(last.clone()));
                     return Err(Box::new(Failure { error, last_good, reached, failed: last, history }));
                 }
             };
@@ -299,18 +302,24 @@ impl<'m> Solver<'m> {
                     }
                     history.push(step(place, StepKind::Failed, outcome.last, outcome.iterations));
                     let reached = stepper.reached();
-                    return Err(Box::new(Failure {
-                        error,
-                        last_good: last,
-                        reached,
-                        failed: outcome.state,
-                        history,
-                    }));
+                    let last_good = self.balanced(last);
+                    return Err(Box::new(Failure { error, last_good, reached, failed: outcome.state, history }));
                 }
             }
         }
         self.balance.set_target(to.clone());
         self.close_gaps(last, history, snaps)
+    }
+
+    /// A state on the way, balanced as the end of a path is.
+    fn balanced(&mut self, state: State) -> State {
+        self.balance.tolerance = self.settings.tolerance;
+        self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });
+        let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
+        match self.solve(state.clone(), limits) {
+            Ok(outcome) if outcome.stop.is_none() => outcome.state,
+            _ => state,
+        }
     }
 
     /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.
@@ -321,7 +330,7 @@ impl<'m> Solver<'m> {
         snaps: Vec<Snap>,
     ) -> std::result::Result<Equilibrium, Box<Failure>> {
         let mut state = start;
-        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         for round in 0.. {
             let model = self.balance.model;
             let Some(Renewal { multipliers, term, gap, tolerance }) = model.renew_multipliers(&state) else { break };
@@ -337,7 +346,7 @@ impl<'m> Solver<'m> {
                 return fail(error, state.clone(), state, history);
             }
             let next = State { multipliers, ..state.clone() };
-            let limits_near = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, test: Test::Monotone };
+            let limits_near = Limits { iterations: CHORD_ITERATIONS, damping: 1.0, ..LIMITS };
             let near = if self.balance.has_tangent() {
                 chord(&mut self.balance, next.clone(), limits_near)
             } else {
@@ -444,16 +453,10 @@ impl<'m> Solver<'m> {
     fn solve(&mut self, start: State, limits: Limits) -> Result<Outcome<State>> {
         let model = self.balance.model;
         let contacts = model.contacts().next().is_some();
-        let test = if contacts { Test::MonotoneOrLower } else { limits.test };
-        let outcome = newton(&mut self.balance, start, Limits { test, ..limits })?;
         let kinks = contacts || (self.balance.drag.is_some() && model.muscles().next().is_some());
-        if outcome.stop != Some(Stop::NoDescent) || !kinks {
-            return Ok(outcome);
-        }
-        let mut iterations = outcome.iterations;
-        let rest = newton(&mut self.balance, outcome.state, Limits { test: Test::Slope, ..limits })?;
-        iterations.extend(rest.iterations);
-        Ok(Outcome { iterations, ..rest })
+        let test = if contacts { Test::MonotoneOrLower } else { limits.test };
+        let otherwise = kinks.then_some(Test::Slope);
+        newton(&mut self.balance, start, Limits { test, otherwise, ..limits })
     }
 
     fn not_converged(&self, stepper: &Stepper, stop: Stop, outcome: &Outcome<State>) -> Error {
@@ -525,7 +528,7 @@ impl<'m> Solver<'m> {
             return Ok(corrected);
         }
         self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });
-        let limits = Limits { iterations: self.settings.max_iterations, damping: DAMPING, test: Test::Monotone };
+        let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         let outcome = self.solve(state.clone(), limits)?;
         let found = match outcome.stop {
             None => outcome.state,

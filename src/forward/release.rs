@@ -7,11 +7,11 @@
 //! enough, and only then a step is believed. A body that rests on a saddle is pushed off along a negative mode.
 
 use super::balance::Drag;
-use super::{Solver, Step, StepKind, step};
+use super::{LIMITS, Solver, Step, StepKind, step};
 use crate::error::Result;
 use crate::math::tensor::{norm, subtract};
 use crate::model::State;
-use crate::solve::newton::{Assessment, Equations, Iteration, Limits, Test};
+use crate::solve::newton::{Assessment, Equations, Iteration, Limits};
 use std::sync::Arc;
 
 /// The body lost its balance on a path and came to the stable equilibrium beyond.
@@ -77,6 +77,7 @@ impl Solver<'_> {
         if !self.settings.release || before.len() >= MOST_SNAPS {
             return None;
         }
+        self.balance.tolerance = self.settings.tolerance;
         let released = self.descend(start, last);
         self.balance.drag = None;
         // a tangent that cannot be factorised ends the attempt, not the run: the failure that led here is told
@@ -86,7 +87,7 @@ impl Solver<'_> {
     fn descend(&mut self, start: &State, last: &State) -> Result<Option<Released>> {
         let model = self.balance.model;
         let iterations = self.settings.max_iterations.min(STEP_ITERATIONS);
-        let limits = Limits { iterations, damping: RELEASE_DAMPING, test: Test::Monotone };
+        let limits = Limits { iterations, damping: RELEASE_DAMPING, ..LIMITS };
         let mut state = self.balance.at_target(start.clone());
         let stiffness = Arc::new(self.balance.stiffness_at_rest());
         let mut drag = Drag { strength: FIRST_DRAG, stiffness, from: model.unknowns(&state) };

@@ -229,8 +229,8 @@ fn faces(scene: &Scene, mesh: &Mesh, FaceSpec(names): &FaceSpec, place: &Place) 
                      element; faces between two elements are not on the boundary"
                 }
                 GeometrySpec::Face(_) | GeometrySpec::FaceMuscle(_) => {
-                    "a face has skin, deep, rim, lip.upper, lip.lower, lid.upper.L, lid.lower.L, deep.perioral, deep.sliding, \
-                     deep.eye.L, the same with .R unless it is half a face, then midline; and xi1=0 to xi3=1"
+                    "a face has skin, deep, rim, lip.upper, lip.lower, lid.upper.L, lid.lower.L, deep.nose, deep.perioral, deep.sliding \
+                     (of which deep.perioral.jaw, deep.perioral.skull, ... are parts), deep.eye.L, the same with .R unless it is half a face, then midline; and xi1=0 to xi3=1"
                 }
             };
             let face = name.to_string().into();

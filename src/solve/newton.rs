@@ -60,12 +60,14 @@ impl Assessment {
 /// Limits of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// Newton iterations before giving up.
+    /// Newton iterations with one test before giving up.
     pub iterations: usize,
     /// The smallest damping factor before giving up.
     pub damping: f64,
     /// The test that steps must pass.
     pub test: Test,
+    /// The test that takes its place from the first step on of which no part passes.
+    pub otherwise: Option<Test>,
 }
 
 /// A test of a step.
@@ -138,6 +140,9 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
     let mut state = start;
     let mut iterations = Vec::new();
     let mut now = equations.assess(&state);
+    let (mut test, mut otherwise) = (limits.test, limits.otherwise);
+    // iterations that the test before has had
+    let mut earlier = 0;
     // the last step with its factor, and the correction that its tangent saw at its end
     let mut previous: Option<(E::Step, f64, E::Step)> = None;
     let stop = loop {
@@ -147,7 +152,7 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
         if !now.admissible {
             break Some(Stop::Inadmissible);
         }
-        if iterations.len() >= limits.iterations {
+        if iterations.len() - earlier >= limits.iterations {
             break Some(Stop::Iterations);
         }
         let step = equations.step(&state)?;
@@ -159,7 +164,7 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             let change = equations.size(correction, -1.0, &step);
             let trust = equations.size(last, 0.0, last) * equations.size(correction, 0.0, correction) * last_factor
                 / (change * length);
-            if limits.test != Test::Slope && trust.is_finite() {
+            if test != Test::Slope && trust.is_finite() {
                 factor = trust.clamp(limits.damping, 1.0);
             }
         }
@@ -181,7 +186,7 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
                 }
                 continue;
             }
-            if limits.test == Test::Slope {
+            if test == Test::Slope {
                 let left = equations.slope(&step);
                 if left > 0.0 {
                     bracket.1 = (factor, left)
@@ -207,7 +212,7 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             // c - (1 - f) d is the part of the correction that is due to curvature
             let curvature = equations.size(&correction, factor - 1.0, &step);
             let better = (0.5 * length * factor * factor / curvature).min(1.0);
-            let lower = limits.test == Test::MonotoneOrLower
+            let lower = test == Test::MonotoneOrLower
                 && !now.outstanding
                 && then.residual < (1.0 - RESIDUAL_LOST * factor) * now.residual;
             if theta < 1.0 - 0.25 * factor || lower || then.converged() {
@@ -223,7 +228,11 @@ pub fn newton<E: Equations>(equations: &mut E, start: E::State, limits: Limits) 
             } else {
                 factor = better.min(0.5 * factor);
                 if factor.is_nan() || factor < limits.damping {
-                    break;
+                    let solved = length <= NEGLIGIBLE && !now.outstanding;
+                    let Some(next) = otherwise.take().filter(|_| !solved) else { break };
+                    // the same step, with the tangent at hand
+                    (test, factor, earlier) = (next, 1.0, iterations.len());
+                    bracket = ((0.0, slope), (factor, 0.0));
                 }
             }
         }

@@ -21,7 +21,7 @@ pub struct Options {
 }
 
 /// The names of faces that the mesh of a face has beside its sides; `midline` only a half, those in `.R` only a whole face.
-pub const FACES: [&str; 15] = [
+pub const FACES: [&str; 19] = [
     "skin",
     "deep",
     "rim",
@@ -35,6 +35,10 @@ pub const FACES: [&str; 15] = [
     "deep.perioral",
     "deep.nose",
     "deep.sliding",
+    "deep.perioral.skull",
+    "deep.perioral.jaw",
+    "deep.sliding.skull",
+    "deep.sliding.jaw",
     "deep.eye.L",
     "deep.eye.R",
 ];
@@ -253,10 +257,12 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
             add(&format!("deep.eye.{letter}"), deep);
         } else if NOSE.0.contains(&row) && column < NOSE.1 {
             add("deep.nose", deep);
-        } else if PERIORAL.0.contains(&row) && column < PERIORAL.1 {
-            add("deep.perioral", deep);
         } else {
-            add("deep.sliding", deep);
+            let perioral = PERIORAL.0.contains(&row) && column < PERIORAL.1;
+            let part = if perioral { "deep.perioral" } else { "deep.sliding" };
+            let bone = if row < MOUTH_ROW { "jaw" } else { "skull" };
+            add(part, deep);
+            add(&format!("{part}.{bone}"), deep);
         }
     }
     let outermost = from_middle + 1 == COLUMNS * fine;
