@@ -1,6 +1,6 @@
 //! Fibre angles from a million measured axes on a bent tricubic mesh of 560 elements: what each part takes, and the memory.
 //!
-//! `cargo run --release --example million_axes [tricubic]`
+//! `cargo run --release --example million_axes [trilinear|tricubic] [axes]`
 
 use risorius::fibres::{data, fit};
 use risorius::mesh::block::block;
@@ -11,7 +11,6 @@ use risorius::scene::{Problem, Units};
 use std::fmt::Write;
 use std::time::Instant;
 
-const AXES: usize = 1_000_000;
 const SIZE_MM: [f64; 3] = [100.0, 80.0, 35.0];
 
 /// Bends the block: x and z turn about an axis along y, by 57 degrees from end to end.
@@ -34,6 +33,7 @@ fn random(state: &mut u64) -> f64 {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let count: usize = std::env::args().nth(2).map_or(Ok(1_000_000), |count| count.parse())?;
     let field = if std::env::args().nth(1).as_deref() == Some("tricubic") { "tricubic" } else { "trilinear" };
     let elements = [10, 8, 7];
     let mut mesh = block(&TricubicHermite, [0.0; 3], SIZE_MM, elements);
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(folder.join("body.exf"), write_mesh(&mesh, &[("coordinates", &mesh.parameters)]))?;
     // a helix through the thickness and a fan, with 10 degrees of noise
     let (mut state, mut text) = (7, String::from("x,y,z,vx,vy,vz\n"));
-    for _ in 0..AXES {
+    for _ in 0..count {
         let at = SIZE_MM.map(|size| size * random(&mut state));
         let a = (60.0 * (at[2] / 35.0 - 0.5) + 0.4 * (at[1] - 40.0)).to_radians();
         let noise = |state: &mut u64| 0.35 * (random(state) + random(state) + random(state) - 1.5);

@@ -26,6 +26,7 @@ pub mod embed;
 pub mod exf;
 pub mod inspect;
 pub mod misfit;
+pub mod moments;
 pub mod normal;
 pub mod pattern;
 pub mod roughness;

@@ -2,6 +2,7 @@
 
 use super::embed::{Sample, Samples};
 use super::misfit::{loss, misfit};
+use super::moments::{self, Moments, Products, legendre};
 use super::pattern::Pattern;
 use super::space::{Angles, Local, Space};
 use crate::mesh::element::{Element, TricubicHermite, Trilinear};
@@ -60,17 +61,19 @@ struct ElementSums<const N: usize> {
     gradient: Vec<[f64; N]>,
 }
 
-/// The data of one element, without the signs of its corners.
+/// The data of one element, without the signs of its corners; its matrices by moments where there are products.
 fn of_element<const N: usize>(
     basis: &impl Element,
     samples: &[Sample],
     local: &Local,
     loss_spec: LossSpec,
     sought: usize,
+    products: Option<&Products>,
     take: impl Fn(&Sample) -> bool,
 ) -> ElementSums<N> {
     let mut sums =
         ElementSums { scalars: [0.0; 5], normal: vec![[[0.0; N]; N]; sought], gradient: vec![[0.0; N]; sought] };
+    let mut moments: Vec<Moments> = vec![Moments::default(); if products.is_some() { sought } else { 0 }];
     for sample in samples.iter().filter(|sample| take(sample)) {
         let psi = basis.values(sample.xi);
         let mut at = [0.0; 2];
@@ -84,21 +87,31 @@ fn of_element<const N: usize>(
         sums.scalars[0] += sample.weight * rho;
         sums.scalars[2] += weight * sought as f64;
         let rates = [found.cosine, 1.0];
+        let stiffness = rates.map(|rate| weight * rate * rate);
         for k in 0..sought {
             let square = found.along[k] * found.along[k];
             sums.scalars[1] += weight * square;
             sums.scalars[3] += weight * part * square;
             sums.scalars[4] += sample.weight * (part + bend * square);
-            let (force, stiffness) = (weight * rates[k] * found.along[k], weight * rates[k] * rates[k]);
-            let (normal, gradient) = (&mut sums.normal[k], &mut sums.gradient[k]);
+            let force = weight * rates[k] * found.along[k];
+            (0..N).for_each(|i| sums.gradient[k][i] += force * psi[i]);
+        }
+        if products.is_some() {
+            moments::add(&mut moments, &sample.xi.map(legendre), &stiffness);
+            continue;
+        }
+        for (normal, stiffness) in sums.normal.iter_mut().zip(stiffness) {
             for i in 0..N {
-                gradient[i] += force * psi[i];
                 let row = stiffness * psi[i];
                 for j in 0..=i {
                     normal[i][j] += row * psi[j];
                 }
             }
         }
+    }
+    if let Some(products) = products {
+        let matrices = sums.normal.iter_mut().zip(&moments);
+        matrices.for_each(|(normal, moments)| products.fill(basis, moments, normal));
     }
     sums
 }
@@ -126,11 +139,14 @@ pub fn sums(
     let local = |e: usize| space.local(e, angles);
     match space.field {
         FieldSpec::Trilinear => summed(zeros, pattern, samples, space, |e| {
-            of_element::<8>(&Trilinear, samples.of(e), &local(e), loss, sought, &take)
+            of_element::<8>(&Trilinear, samples.of(e), &local(e), loss, sought, None, &take)
         }),
-        FieldSpec::Tricubic => summed(zeros, pattern, samples, space, |e| {
-            of_element::<64>(&TricubicHermite, samples.of(e), &local(e), loss, sought, &take)
-        }),
+        FieldSpec::Tricubic => {
+            let products = Products::new(&TricubicHermite);
+            summed(zeros, pattern, samples, space, |e| {
+                of_element::<64>(&TricubicHermite, samples.of(e), &local(e), loss, sought, Some(&products), &take)
+            })
+        }
     }
 }
 
