@@ -621,3 +621,96 @@ fn every_template_is_a_problem() {
     stdout(&folder, &["run", "-q", "fit/problem.toml", "--out", "a", "--set", "fit.frames={first=0,last=2}"], 0);
     stdout(&folder, &["run", "-q", "fibres/problem.toml", "--out", "b"], 0);
 }
+
+/// Lines of `log.jsonl`, each a JSON object with time, level and text.
+fn log(folder: &TempDir, run: &str) -> Vec<Value> {
+    let lines: Vec<Value> =
+        text(folder, &format!("{run}/log.jsonl")).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    for line in &lines {
+        assert!(line["time_s"].as_f64().is_some_and(|time| time >= 0.0) && line["text"].is_string(), "{line}");
+        assert!(["stage", "info", "warn", "error"].contains(&line["level"].as_str().unwrap()), "{line}");
+    }
+    lines
+}
+
+#[test]
+fn the_log_has_frames_stages_warnings_and_errors() {
+    let folder = folder();
+    let quiet = risorius(&folder, &["run", "cantilever.toml", "--out", "fine", "-q"]);
+    assert!(quiet.status.success() && quiet.stderr.is_empty());
+    let lines = log(&folder, "fine");
+    let frames: Vec<&Value> = lines.iter().filter(|line| line["numbers"]["frame"].is_number()).collect();
+    let [frame] = frames[..] else { panic!("{lines:?}") };
+    let range = ["det_f_min", "det_f_max"].map(|name| frame["numbers"][name].as_f64().unwrap());
+    assert!(range[0] < range[1] && frame["numbers"]["iterations"].as_f64().unwrap() >= 1.0, "{frame}");
+    let stages: Vec<&str> =
+        lines.iter().filter(|line| line["level"] == "stage").map(|line| line["text"].as_str().unwrap()).collect();
+    for stage in ["read the problem", "order the unknowns", "solve the frames", "make the page"] {
+        assert!(stages.contains(&stage), "{stages:?}");
+    }
+    let last = lines.last().unwrap();
+    assert_eq!((last["text"].as_str(), last["numbers"]["frames_ok"].as_f64()), (Some("converged"), Some(1.0)));
+
+    let arguments =
+        ["run", "cantilever.toml", "--out", "hopeless", HOPELESS[0], HOPELESS[1], HOPELESS[2], HOPELESS[3]];
+    assert_eq!(risorius(&folder, &arguments).status.code(), Some(4));
+    let lines = log(&folder, "hopeless");
+    assert!(lines.iter().any(|line| line["level"] == "error" && line["code"] == "S003"), "{lines:?}");
+    // a later run in the same place begins a log of its own
+    assert!(risorius(&folder, &["run", "cantilever.toml", "--out", "hopeless", "--force"]).status.success());
+    assert!(log(&folder, "hopeless").iter().all(|line| line["level"] != "error"));
+}
+
+#[test]
+fn verbose_says_what_each_stage_took() {
+    let folder = folder();
+    let said = stderr(&folder, &["run", "cantilever.toml", "-v"], 0);
+    for stage in ["read the problem", "build the model", "solve the frames", "write tables and shapes"] {
+        let line = said.lines().find(|line| line.contains(stage)).unwrap_or_else(|| panic!("{stage}: {said}"));
+        let seconds: f64 = line.split_whitespace().next().unwrap().parse().unwrap();
+        assert!((0.0..600.0).contains(&seconds), "{line}");
+    }
+    assert!(!stderr(&folder, &["run", "cantilever.toml"], 0).contains("solve the frames"));
+    assert_eq!(risorius(&folder, &["run", "cantilever.toml", "-v", "-q"]).status.code(), Some(2));
+}
+
+#[test]
+fn every_run_leaves_its_activations_for_opensim() {
+    let folder = folder();
+    let run = ["run", "cantilever.toml", "--out", "run"];
+    stdout(&folder, &run, 0);
+    let sto = text(&folder, "run/tables/activations.sto");
+    let (head, rows) = sto.split_once("endheader\n").unwrap();
+    assert!(head.contains("nRows=1\n") && head.contains("nColumns=2\n"), "{sto}");
+    assert_eq!(rows, "time\tslab\n0.0\t0.02\n");
+    // as the exporter writes it
+    stdout(&folder, &["export", "run", "--to", "sto"], 0);
+    assert_eq!(text(&folder, "run/export/activations.sto"), sto);
+}
+
+#[test]
+fn meshes_and_measured_directions_are_inspected() {
+    let folder = folder();
+    stdout(&folder, &["run", "cantilever.toml", "--out", "run"], 0);
+    let exf = "run/view/result_0000.exf";
+    let found: Value = serde_json::from_str(&stdout(&folder, &["inspect", exf, "--json"], 0)).unwrap();
+    assert_eq!((found["elements"].as_u64(), found["nodes"].as_u64()), (Some(2), Some(12)));
+    assert_eq!(found["fields"]["deformed"]["bases"][0], "c.Hermite*c.Hermite*c.Hermite");
+    let extent: Vec<f64> = (0..3).map(|i| found["extent"][1][i].as_f64().unwrap()).collect();
+    // the beam at rest ends at 40 mm, and bends down
+    assert!((extent[0] - 40.0).abs() < 5.0 && found["extent"][0][2].as_f64().unwrap() < 0.0, "{extent:?}");
+    let page = stdout(&folder, &["inspect", exf], 0);
+    assert!(page.contains("[mesh] or [[muscle]]: exf = \"result_0000.exf\", field = \"coordinates\""), "{page}");
+
+    let vtu = "run/view/muscles_0000.vtu";
+    let found: Value = serde_json::from_str(&stdout(&folder, &["inspect", vtu, "--json"], 0)).unwrap();
+    let points = found["points"].as_u64().unwrap();
+    let stretch = found["fields"].as_array().unwrap().iter().find(|field| field["name"] == "stretch").unwrap();
+    assert!(points > 0 && stretch["components"] == 1 && stretch["on_points"] == true, "{found}");
+    let uses = format!("[[fibres.data]]: file = \"muscles_0000.vtu\" ({points} axes)");
+    assert_eq!(found["uses"][0], uses);
+    fs::write(folder.path().join("broken.vtu"), "no file of VTK").unwrap();
+    assert!(stderr(&folder, &["inspect", "broken.vtu"], 3).contains("M014"));
+    fs::write(folder.path().join("broken.exf"), "EX Version: 9\n").unwrap();
+    assert!(stderr(&folder, &["inspect", "broken.exf"], 3).contains("G008"));
+}

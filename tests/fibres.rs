@@ -1,6 +1,8 @@
 //! Are known fibre fields found again from axes, and is what the data do not say told?
 
 mod common;
+#[path = "fibres/tricubic.rs"]
+mod tricubic;
 
 use common::Random;
 use risorius::fibres::{Axis, FibreFit, fit};
@@ -11,8 +13,8 @@ use risorius::mesh::exf::{ExFile, write_angles, write_mesh};
 use risorius::mesh::fibre_angles::{FibreAngles, axes};
 use risorius::mesh::{MaterialPoint, Mesh};
 use risorius::scene::{
-    AnglesSpec, BlockSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, GeometrySpec, LossSpec, MeshSpec,
-    OutsideSpec, SmoothnessSpec, Units,
+    AnglesSpec, BlockSpec, FibreBody, FibreDataSpec, FibreProblem, FieldSpec, FixedNodeSpec, GeometrySpec, LossSpec,
+    MeshSpec, OutsideSpec, SmoothnessSpec, Units,
 };
 use risorius::{Place, error::Error};
 use std::collections::BTreeMap;
@@ -28,6 +30,7 @@ fn problem(angles: AnglesSpec) -> FibreProblem {
         name: "test".into(),
         body: FibreBody::Mesh(MeshSpec { geometry: GeometrySpec::Block(block), place: place.clone() }),
         angles,
+        field: FieldSpec::Trilinear,
         data: Vec::new(),
         outside: OutsideSpec::Drop,
         smoothness: SmoothnessSpec::Gcv,
@@ -183,7 +186,7 @@ fn ring() -> (Mesh, FibreAngles) {
         (e, mesh.corners[e].map(corner))
     });
     let own: BTreeMap<usize, [[f64; 3]; 8]> = own.collect();
-    (mesh, FibreAngles { nodes, own })
+    (mesh, FibreAngles { nodes, own, tricubic: None })
 }
 
 #[test]
@@ -722,6 +725,57 @@ fn a_run_leaves_a_muscle_that_can_be_used() {
         code == 3 && ["did you mean `slab`", "fibres.folds", "fibres.angles"].iter().all(|part| text.contains(part)),
         "{text}"
     );
+}
+
+/// The lock file of a run does the same again, to the last bit, and as a muscle its tricubic field can be used.
+#[test]
+fn a_lock_file_repeats_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mesh = slab();
+    let truth = field(&mesh, |[x, y, _]| [(y - 10.0).atan2(70.0 - x) / DEGREE, 8.0, 0.0]);
+    let mut random = Random::new(80);
+    let mut table = "x,y,z,vx,vy,vz\n".to_string();
+    for axis in sampled(&mesh, &truth, 60, &mut random) {
+        let ([x, y, z], [u, v, w]) = (axis.position, disturbed(axis.fibre, 5.0 * DEGREE, &mut random));
+        table += &format!("{x},{y},{z},{u},{v},{w}\n");
+    }
+    std::fs::write(path("axes.csv"), table).unwrap();
+    let blemker = "blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }";
+    let text = format!(
+        "[task]\nkind = \"fibres\"\n[[muscle]]\nname = \"slab\"\nblock = {{ origin_mm = [4.5, 2.0, 14.2], size_mm = [50, 16, 4], \
+         elements = [5, 2, 1] }}\nfibre_angles_deg = [0, 0, 0]\n{blemker}\n[fibres]\nmuscle = \"slab\"\nfield = \"tricubic\"\n\
+         loss = {{ huber_deg = 8 }}\noutside = {{ project_mm = 1 }}\n[[fibres.data]]\nfile = \"axes.csv\"\nunits = \"mm\"\n\
+         [[fibres.fixed]]\nnode = 3\nangles_deg = [10, 5, 0]\n"
+    );
+    std::fs::write(path("fibres.toml"), text).unwrap();
+    let run = |file: &str, out: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("risorius").unwrap();
+        command.current_dir(folder.path()).args(["run", file, "--out", out, "-q"]).assert().success();
+    };
+    run("fibres.toml", "once");
+    // from another folder
+    std::fs::create_dir(path("elsewhere")).unwrap();
+    std::fs::copy(path("once/problem.lock.toml"), path("elsewhere/again.toml")).unwrap();
+    run("elsewhere/again.toml", "twice");
+    for file in ["problem.lock.toml", "fibres.exf", "tables/fibre_angles.csv", "tables/fibre_fit.csv", "summary.txt"]
+    {
+        let [once, twice] = ["once", "twice"].map(|run| std::fs::read(path(run).join(file)).unwrap());
+        assert!(once == twice && !once.is_empty(), "{file}");
+    }
+    let lock = std::fs::read_to_string(path("once/problem.lock.toml")).unwrap();
+    for line in
+        ["field = \"tricubic\"", "folds = 5", "smoothness = \"gcv\"", "angles = [\"A\", \"B\"]", "weight = 1.0"]
+    {
+        assert!(lock.lines().any(|known| known == line), "{line}\n{lock}");
+    }
+    let angles = std::fs::read_to_string(path("once/tables/fibre_angles.csv")).unwrap();
+    let fixed = angles.lines().nth(4).unwrap();
+    assert!(fixed.starts_with("3,") && fixed.ends_with(",1,1"), "{fixed}");
+    let file = ExFile::read(&path("once/fibres.exf")).unwrap();
+    let geometry = file.geometry(None).unwrap();
+    let kept = file.angles("fibres", &geometry).unwrap();
+    assert!(kept.tricubic.is_some() && (kept.nodes[3][0] - 10.0 * DEGREE).abs() < 1e-12);
 }
 
 /// The problem that is shipped, against the fan that its data were made from.

@@ -6,7 +6,6 @@ use super::progress::Meter;
 use super::telling::new_marker_sd;
 use super::terminal::print;
 use super::{Ending, Flags};
-use crate::cli::diagnostics::render_error;
 use crate::error::{Error, Result};
 use crate::fit::Fit;
 use crate::fit::advise::{Advice, Criterion, View, advise, candidates};
@@ -56,7 +55,7 @@ pub(super) fn run(question: &Question<'_>, flags: &Flags) -> Result<Ending> {
     let positions: Vec<Vector> = points.iter().map(|point| model.mesh().position(*point)).collect();
     let taken: Vec<Vector> = fit.markers().iter().map(|marker| model.mesh().position(marker.point)).collect();
     let sd = new_marker_sd(&fit);
-    let mut meter = Meter::new(flags, all.len());
+    let mut meter = Meter::new(flags, all.len(), None);
     let mut views = Vec::new();
     for (frame, controls) in &all {
         let estimate = match controls {
@@ -68,11 +67,11 @@ pub(super) fn run(question: &Question<'_>, flags: &Flags) -> Result<Ending> {
                 let evidence = Evidence::of(&estimate, model.controls(), fit.unknowns());
                 let rates = fit.rates_at(&points, &estimate.equilibrium.state);
                 views.extend(evidence.zip(rates).map(|(evidence, rates)| View::new(&evidence, &rates, sd)));
-                meter.frame(format!("frame {frame}: rms {:.3} mm", estimate.rms_mm));
+                meter.frame(&format!("frame {frame}: rms {:.3} mm", estimate.rms_mm), &[]);
             }
             Err(error) => {
-                meter.say(&render_error(&error, flags.colour()));
-                meter.frame(format!("frame {frame}: failed"));
+                meter.fail(&error, flags);
+                meter.frame(&format!("frame {frame}: failed"), &[]);
             }
         }
     }

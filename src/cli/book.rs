@@ -4,7 +4,7 @@ use super::Flags;
 use super::estimate::Estimates;
 use super::noticed::noticed;
 use super::outer::PAGE;
-use super::progress::Meter;
+use super::progress::{Meter, took};
 use super::run::{Run, Tally};
 use super::telling::Telling;
 use super::terminal::print;
@@ -137,6 +137,7 @@ impl<'a> Book<'a> {
             self.tally.warn(frame, vec![warning], meter, flags);
         }
         self.record.told_of_clip(&self.telling.clip, &self.labels)?;
+        took(&run.log, flags, "of that: write tables and shapes", self.record.seconds());
         self.record.finish(work, self.estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
         let controls: Vec<&str> = self.labels.iter().map(String::as_str).collect();
         let sought: Vec<&str> = fit.unknowns().iter().map(|k| self.labels[*k].as_str()).collect();

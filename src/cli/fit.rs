@@ -7,7 +7,6 @@ use super::forward::probes;
 use super::prepare::{Clip, Prepared};
 use super::progress::Meter;
 use super::run::{Run, Tally};
-use crate::cli::diagnostics::render_error;
 use crate::error::{Result, Warning};
 use crate::fit::free_head::FreeHead;
 use crate::fit::head::{HeadFrame, HeadMotion};
@@ -48,7 +47,7 @@ pub(super) fn fit(
     for (frame, warning) in &run.noticed {
         book.tally.keep(*frame, std::slice::from_ref(warning));
     }
-    let mut meter = Meter::new(flags, frames.len());
+    let mut meter = Meter::new(flags, frames.len(), Some(&run.log));
     let mut done = 0;
     // frames wait for the others where the clip is smoothed
     let smoothed = spec.objectives.clip == ClipSpec::Smoother;
@@ -67,7 +66,7 @@ pub(super) fn fit(
                     book.tally.failed.push(failed);
                 }
             }
-            meter.frame("done before".into());
+            meter.frame("done before", &[]);
         }
         if let Some(Carried { fit: memory, halved }) = carried {
             fit.restore(memory)?;
@@ -82,15 +81,19 @@ pub(super) fn fit(
         let frame = Frame { index, time_s: recording.frames[index].time_s };
         let before = fit.work().linear.factorisations;
         let said;
+        let mut numbers = vec![("frame", index as f64), ("frame_time_s", frame.time_s)];
         let outcome = match fit.frame(recording, index) {
             Ok(estimate) => {
+                let (steps, factorisations) = (estimate.iterations.len(), fit.work().linear.factorisations - before);
                 said = format!(
-                    "t {:.3} s: rms {:.3} mm, {} steps, {} factorisations",
-                    frame.time_s,
-                    estimate.rms_mm,
-                    estimate.iterations.len(),
-                    fit.work().linear.factorisations - before
+                    "t {:.3} s: rms {:.3} mm, {steps} steps, {factorisations} factorisations",
+                    frame.time_s, estimate.rms_mm
                 );
+                numbers.extend([
+                    ("rms_mm", estimate.rms_mm),
+                    ("steps", steps as f64),
+                    ("factorisations", factorisations as f64),
+                ]);
                 let saved = if smoothed {
                     passed.push(Some(estimate.clone()));
                     SavedFrame { estimate, error: None, unestimated: None, help: None }
@@ -100,7 +103,7 @@ pub(super) fn fit(
                 SavedOutcome::Fitted(Box::new(saved))
             }
             Err(error) => {
-                meter.say(&render_error(&error, flags.colour()));
+                meter.fail(&error, flags);
                 said = format!("t {:.3} s: failed", frame.time_s);
                 passed.push(None);
                 let failed = FailedFrame::new(index, &error);
@@ -109,7 +112,7 @@ pub(super) fn fit(
             }
         };
         checkpoints.save(at, &outcome, &Carried { fit: fit.memory(), halved: book.estimates.tangent_states() })?;
-        meter.frame(said);
+        meter.frame(&said, &numbers);
         run.write_running(&book.tally)?;
     }
     meter.finish();
@@ -147,7 +150,7 @@ fn smooth(
             return Ok(());
         }
         Err(error) => {
-            meter.say(&render_error(&error, flags.colour()));
+            meter.fail(&error, flags);
             book.tally.failed.push(FailedFrame::new(frames[0], &error));
             passed.to_vec()
         }

@@ -4,10 +4,9 @@ use super::Flags;
 use super::estimate::{Estimates, of_probes};
 use super::noticed::noticed;
 use super::prepare::Prepared;
-use super::progress::Meter;
+use super::progress::{Meter, stage, took};
 use super::run::{Run, Tally};
 use super::terminal::print;
-use crate::cli::diagnostics::render_error;
 use crate::error::Result;
 use crate::fit::sequence::settings;
 use crate::forward::drives::drives;
@@ -30,8 +29,8 @@ pub(super) fn forward(
     let probes = probes(scene, built);
     let mut record = Record::create(&run.folder, model, &probes, &scene.output, false)?;
     let drives = drives(scene, model)?;
-    let mut solver = Solver::new(model, settings(scene))?;
-    let mut meter = Meter::new(flags, drives.len());
+    let mut solver = stage(&run.log, flags, "order the unknowns", || Solver::new(model, settings(scene)))?;
+    let mut meter = Meter::new(flags, drives.len(), Some(&run.log));
     let mut tally = Tally::default();
     let mut state = model.rest();
     let mut last: Option<(Frame, Equilibrium)> = None;
@@ -49,16 +48,24 @@ pub(super) fn forward(
                 tally.frames_ok += 1;
                 let iterations = solver.work().iterations - before;
                 let range = found.evaluation.det_f;
-                meter.frame(format!(
-                    "t {time_s:.3} s: {iterations} iterations, det F {:.3} to {:.3}",
-                    range.min, range.max
-                ));
+                let numbers = [
+                    ("frame", index as f64),
+                    ("frame_time_s", *time_s),
+                    ("iterations", iterations as f64),
+                    ("det_f_min", range.min),
+                    ("det_f_max", range.max),
+                ];
+                let [low, high] = [range.min, range.max];
+                meter.frame(
+                    &format!("t {time_s:.3} s: {iterations} iterations, det F {low:.3} to {high:.3}"),
+                    &numbers,
+                );
                 tally.warn(frame, noticed(frame, model, &found), &mut meter, flags);
                 state.clone_from(&found.state);
                 last = Some((frame, found));
             }
             Err(failure) => {
-                meter.say(&render_error(&failure.error, flags.colour()));
+                meter.fail(&failure.error, flags);
                 let [last_good, failed] = record.failed(frame, &failure)?;
                 meter.say(&format!(
                     "  written: the last equilibrium, {:.1} % of the way: {}; the iterate that failed: {}\n",
@@ -66,7 +73,10 @@ pub(super) fn forward(
                     last_good.display(),
                     failed.display()
                 ));
-                meter.frame(format!("t {time_s:.3} s: failed"));
+                meter.frame(
+                    &format!("t {time_s:.3} s: failed"),
+                    &[("frame", index as f64), ("frame_time_s", *time_s)],
+                );
                 tally.failed.push(FailedFrame::new(index, &failure.error));
                 // the next frame starts from the last equilibrium on the way
                 state = failure.last_good;
@@ -81,6 +91,7 @@ pub(super) fn forward(
     }
     meter.finish();
     *work = solver.work();
+    took(&run.log, flags, "of that: write tables and shapes", record.seconds());
     record.finish(work, estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
     if let Some((frame, found)) = &last {
         let x = model.current(&found.state);

@@ -1,16 +1,25 @@
-//! `risorius inspect FILE`: what is in a marker recording, or in the folder of a run.
+//! `risorius inspect FILE`: what is in a marker recording, in an EX file, in a file of VTK, or in the folder of a run.
 
 use super::Ending;
 use super::terminal::print;
 use crate::error::{Error, Result};
-use crate::markers;
+use crate::mesh::exf;
 use crate::report::playback::Contents;
+use crate::{fibres, markers};
 use serde::Serialize;
 use std::fmt::Display;
 use std::path::Path;
 
 pub(super) fn inspect(file: &Path, json: bool) -> Result<Ending> {
-    if file.is_dir() { show(&Contents::of(file)?, json) } else { show(&markers::inspect(file)?, json) }
+    if file.is_dir() {
+        return show(&Contents::of(file)?, json);
+    }
+    let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("exf" | "ex" | "exnode" | "exelem") => show(&exf::inspect(file)?, json),
+        Some("vtk" | "vtu" | "vtp") => show(&fibres::inspect::inspect(file)?, json),
+        _ => show(&markers::inspect(file)?, json),
+    }
 }
 
 fn show(found: &(impl Serialize + Display), json: bool) -> Result<Ending> {

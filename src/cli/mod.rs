@@ -95,9 +95,9 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// What is in a marker recording, or in the folder of a run
+    /// What is in a recording, an EX file, a file of VTK or the folder of a run
     Inspect {
-        /// An MCAP, C3D, TRC or CSV file, or a folder
+        /// An MCAP, C3D, TRC, CSV, EXF, VTK, VTU or VTP file, or a folder
         file: PathBuf,
         /// As JSON
         #[arg(long)]
@@ -189,6 +189,9 @@ struct Flags {
     /// Only errors and results
     #[arg(short, long, global = true)]
     quiet: bool,
+    /// What each stage does and takes
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    verbose: bool,
     /// Colours of messages
     #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
     color: When,

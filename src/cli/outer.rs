@@ -8,10 +8,10 @@ use super::terminal::tell;
 use crate::error::Result;
 use crate::fit::outer::{Outcome, find};
 use crate::fit::sequence::sought;
-use crate::report::Frame;
 use crate::report::state::{Checkpoints, Guard};
 use crate::report::summary::{outer_page, outer_warnings};
 use crate::report::tables::write_outer;
+use crate::report::{Frame, Level};
 use crate::scene::Task;
 
 /// The file with the paragraph of the page.
@@ -41,6 +41,7 @@ pub(super) fn settle(
         return Ok(Settled { prepared, checkpoints, interrupted: false });
     };
     let mut say = |line: String| {
+        run.log.add(Level::Info, None, &line, &[]);
         if !flags.quiet {
             tell(&format!("{line}\n"));
         }
@@ -54,6 +55,7 @@ pub(super) fn settle(
     let first = outcome.frames.first().map_or(0, |frame| frame.frame);
     for (frame, warning) in outer_warnings(&outcome, &names) {
         flags.warn(std::slice::from_ref(&warning));
+        run.log.warn(&warning);
         let index = frame.unwrap_or(first);
         run.noticed.push((Frame { index, time_s: clip.recording.frames[index].time_s }, warning));
     }

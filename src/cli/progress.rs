@@ -1,60 +1,121 @@
-//! Progress of long work on standard error: a bar on a terminal, a plain line per frame elsewhere.
+//! Progress of long work on standard error: a bar on a terminal, a plain line per frame elsewhere; and in the log of the run.
 
+use super::diagnostics::{render_error, render_warning};
 use super::terminal::tell;
 use super::{Flags, Progress};
+use crate::error::{Error, Warning};
+use crate::report::{Level, Log};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
+use std::sync::Arc;
+use std::time::Instant;
 
 /// Shows how far a run is.
-pub(super) enum Meter {
+pub(super) struct Meter {
+    shown: Shown,
+    log: Option<Arc<Log>>,
+}
+
+/// How it is shown.
+enum Shown {
     Bar(ProgressBar),
     Plain { done: usize, of: usize },
     Silent,
 }
 
 impl Meter {
-    /// For work of a number of frames.
-    pub fn new(flags: &Flags, frames: usize) -> Meter {
-        if flags.quiet || flags.progress == Progress::None {
-            return Meter::Silent;
-        }
-        if flags.progress == Progress::Plain || !std::io::stderr().is_terminal() {
-            return Meter::Plain { done: 0, of: frames };
-        }
-        let bar = ProgressBar::new(frames as u64);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {eta} left  {msg}") {
-            bar.set_style(style);
-        }
-        Meter::Bar(bar)
+    /// For work of a number of frames, of a run that has a log.
+    pub fn new(flags: &Flags, frames: usize, log: Option<&Arc<Log>>) -> Meter {
+        Meter { shown: Shown::new(flags, frames), log: log.cloned() }
     }
 
-    /// A frame is done; `what` says how.
-    pub fn frame(&mut self, what: String) {
-        match self {
-            Meter::Bar(bar) => {
+    /// A frame is done; `what` says how, and `numbers` are those of it.
+    pub fn frame(&mut self, what: &str, numbers: &[(&str, f64)]) {
+        if let Some(log) = &self.log {
+            log.add(Level::Info, None, what, numbers);
+        }
+        match &mut self.shown {
+            Shown::Bar(bar) => {
                 bar.inc(1);
-                bar.set_message(what);
+                bar.set_message(what.to_owned());
             }
-            Meter::Plain { done, of } => {
+            Shown::Plain { done, of } => {
                 *done += 1;
                 tell(&format!("{done}/{of} {what}\n"));
             }
-            Meter::Silent => {}
+            Shown::Silent => {}
         }
     }
 
     /// A line that stays.
     pub fn say(&self, line: &str) {
-        match self {
-            Meter::Bar(bar) => bar.suspend(|| tell(line)),
-            Meter::Plain { .. } | Meter::Silent => tell(line),
+        if let Some(log) = &self.log {
+            log.add(Level::Info, None, line, &[]);
+        }
+        self.show(line);
+    }
+
+    /// What a frame gave notice of.
+    pub fn warn(&self, warning: &Warning, flags: &Flags) {
+        if let Some(log) = &self.log {
+            log.warn(warning);
+        }
+        if flags.shows_warnings() {
+            self.show(&render_warning(warning, flags.colour()));
+        }
+    }
+
+    /// Why a frame failed.
+    pub fn fail(&self, error: &Error, flags: &Flags) {
+        if let Some(log) = &self.log {
+            log.error(error);
+        }
+        self.show(&render_error(error, flags.colour()));
+    }
+
+    fn show(&self, line: &str) {
+        match &self.shown {
+            Shown::Bar(bar) => bar.suspend(|| tell(line)),
+            Shown::Plain { .. } | Shown::Silent => tell(line),
         }
     }
 
     /// The work is over.
     pub fn finish(&self) {
-        if let Meter::Bar(bar) = self {
+        if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
+    }
+}
+
+impl Shown {
+    fn new(flags: &Flags, frames: usize) -> Shown {
+        if flags.quiet || flags.progress == Progress::None {
+            return Shown::Silent;
+        }
+        if flags.progress == Progress::Plain || !std::io::stderr().is_terminal() {
+            return Shown::Plain { done: 0, of: frames };
+        }
+        let bar = ProgressBar::new(frames as u64);
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} frames, {eta} left  {msg}") {
+            bar.set_style(style);
+        }
+        Shown::Bar(bar)
+    }
+}
+
+/// Does a stage of a run; the log says what it took, and under `-v` the terminal.
+pub(super) fn stage<T>(log: &Log, flags: &Flags, what: &str, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = work();
+    took(log, flags, what, start.elapsed().as_secs_f64());
+    done
+}
+
+/// Says what a stage took.
+pub(super) fn took(log: &Log, flags: &Flags, what: &str, seconds: f64) {
+    log.add(Level::Stage, None, what, &[("seconds", seconds)]);
+    if flags.verbose {
+        tell(&format!("{seconds:>9.3} s  {what}\n"));
     }
 }

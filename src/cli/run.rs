@@ -4,17 +4,16 @@ use super::check::describe;
 use super::outer::Settled;
 use super::prepare::{Prepared, prepare};
 use super::problem::Source;
-use super::progress::Meter;
+use super::progress::{Meter, stage};
 use super::terminal::tell;
 use super::{Ending, Flags, fibres, fit, forward, more_about, outer, study};
-use crate::cli::diagnostics::render_warning;
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
 use crate::model::Model;
 use crate::report::html;
 use crate::report::manifest::Input;
 use crate::report::state::{Checkpoints, Guard, Left};
-use crate::report::{FailedFrame, Frame, FrameWarning, Manifest, RunFolder, Status};
+use crate::report::{FailedFrame, Frame, FrameWarning, Log, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -29,6 +28,8 @@ pub(super) struct Run {
     pub inputs: Vec<Input>,
     /// What came up before the first frame.
     pub noticed: Vec<(Frame, Warning)>,
+    /// What it says, for `log.jsonl`.
+    pub log: Arc<Log>,
     interrupted: Arc<AtomicBool>,
 }
 
@@ -51,19 +52,23 @@ impl Tally {
     /// Shows what a frame gave notice of, and keeps it.
     pub fn warn(&mut self, frame: Frame, warnings: Vec<Warning>, meter: &mut Meter, flags: &Flags) {
         for warning in warnings {
-            if flags.shows_warnings() {
-                meter.say(&render_warning(&warning, flags.colour()));
-            }
+            meter.warn(&warning, flags);
             self.warnings.push(FrameWarning::new(frame.index, &warning));
         }
     }
 }
 
 impl Run {
+    /// That begins now; the log is kept in its folder.
+    fn new(folder: RunFolder, inputs: Vec<Input>, log: Arc<Log>) -> Run {
+        log.keep_in(&folder);
+        let (start, interrupted) = (Instant::now(), watch_interrupt());
+        Run { folder, start, inputs, noticed: Vec::new(), log, interrupted }
+    }
+
     /// That goes on in the folder of a run that began before.
     pub fn again(folder: &Path, inputs: Vec<Input>) -> Result<Run> {
-        let folder = RunFolder::open(folder)?;
-        Ok(Run { folder, start: Instant::now(), inputs, noticed: Vec::new(), interrupted: watch_interrupt() })
+        Ok(Run::new(RunFolder::open(folder)?, inputs, Arc::default()))
     }
 
     /// Whether Ctrl-C was pressed.
@@ -96,12 +101,13 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
             Problem::Scene(_) => {}
         }
     }
-    let start = Instant::now();
-    let mut source = Source::read(path, flags)?;
+    let (start, log) = (Instant::now(), Arc::new(Log::default()));
+    let mut source = stage(&log, flags, "read the problem", || Source::read(path, flags))?;
     // the recording is read before anything is written: a mistake in it leaves no folder behind
-    let prepared = prepare(&source)?;
+    let prepared = stage(&log, flags, "build the model and lay the recording on it", || prepare(&source))?;
     let Prepared { built, halved, warnings, .. } = &prepared;
     flags.warn(warnings);
+    warnings.iter().for_each(|warning| log.warn(warning));
     if flags.strict && !warnings.is_empty() {
         let noun = if warnings.len() == 1 { "warning" } else { "warnings" };
         tell(&format!("error: {} {noun} under --strict, nothing was run\n", warnings.len()));
@@ -126,7 +132,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         Task::Fit => Some(Checkpoints::create(&folder, &Guard::new(&lock, inputs.clone()))?),
         Task::Forward => None,
     };
-    let run = Run { folder, start, inputs, noticed: Vec::new(), interrupted: watch_interrupt() };
+    let run = Run { start, ..Run::new(folder, inputs, log) };
     run.write_running(&Tally::default())?;
     solve(source, prepared, run, flags, (checkpoints, None))
 }
@@ -165,7 +171,9 @@ fn solve(
     let Settled { prepared, checkpoints, interrupted } = settled;
     let outcome = match interrupted {
         true => Ok(Tally { interrupted, ..Tally::default() }),
-        false => task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work),
+        false => stage(&run.log, flags, "solve the frames", || {
+            task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work)
+        }),
     };
     let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags);
     if resumable {
@@ -199,10 +207,10 @@ fn run_folder(name: &str, flags: &Flags) -> Result<RunFolder> {
 }
 
 /// Makes the folder of a run that reads these files, and writes that it runs.
-pub(super) fn begin(name: &str, files: &[&Path], flags: &Flags) -> Result<Run> {
+pub(super) fn begin(name: &str, files: &[&Path], log: Arc<Log>, flags: &Flags) -> Result<Run> {
     let inputs = files.iter().map(|path| Input::read(path)).collect::<Result<_>>()?;
     let folder = run_folder(name, flags)?;
-    let run = Run { folder, start: Instant::now(), inputs, noticed: Vec::new(), interrupted: watch_interrupt() };
+    let run = Run::new(folder, inputs, log);
     run.write_running(&Tally::default())?;
     Ok(run)
 }
@@ -219,6 +227,7 @@ pub(super) fn finish(
     // the first error is the one to tell
     let ended = outcome.and_then(|tally| manifest.and_then(|()| conclude(run, tally, flags)));
     if let Err(error) = &ended {
+        run.log.error(error);
         Status::write_failed(&run.folder, error);
         let frames = Status::read(run.folder.path()).map_or(0, |status| status.frames_ok);
         if frames > 0 {
@@ -253,10 +262,12 @@ fn conclude(run: &Run, tally: Tally, flags: &Flags) -> Result<Ending> {
         true => Status::interrupted(frames_ok, failed),
         false => Status::finished(frames_ok, failed),
     };
-    Status { exit: Some(ending.exit_code()), warnings, ..status }.write(&run.folder)?;
+    let status = Status { exit: Some(ending.exit_code()), warnings, ..status };
+    status.write(&run.folder)?;
     if frames_ok > 0 {
-        write_page(&run.folder, flags)?;
+        stage(&run.log, flags, "make the page", || write_page(&run.folder, flags))?;
     }
+    run.log.ended(&status);
     Ok(ending)
 }
 

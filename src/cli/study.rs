@@ -10,16 +10,17 @@ use crate::report;
 use crate::scene::{ReferenceSpec, Study};
 use crate::study::{Prepared, Sweep, variants};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Solves, times and compares all variants; leaves tables, pictures and a page, which is printed.
 pub(super) fn run(study: &Study, path: &Path, flags: &Flags) -> Result<Ending> {
     if flags.dry_run {
         return check(study);
     }
-    let run = begin(&study.name, &[path, &study.problem], flags)?;
+    let run = begin(&study.name, &[path, &study.problem], Arc::default(), flags)?;
     // the reference, every variant once, then all repetitions
-    let mut meter = Meter::new(flags, 1 + variants(study).len() + study.repetitions);
-    let mut tell = |line: &str| meter.frame(line.to_owned());
+    let mut meter = Meter::new(flags, 1 + variants(study).len() + study.repetitions, Some(&run.log));
+    let mut tell = |line: &str| meter.frame(line, &[]);
     let outcome = Sweep::new(study, &mut tell, &|| run.is_interrupted()).run();
     meter.finish();
     let mut work = Work::default();

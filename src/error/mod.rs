@@ -752,6 +752,14 @@ pub enum Error {
         /// The table `[fibres]`.
         place: Box<Place>,
     },
+    /// A tricubic field of angles on a trilinear mesh whose local directions change from element to element.
+    #[error("the local directions of elements {} and {} do not continue each other: a tricubic field needs that on a trilinear mesh", .elements[0], .elements[1])]
+    UnlikeDirections {
+        /// Indices of two elements that share a node.
+        elements: [usize; 2],
+        /// The table `[fibres]`.
+        place: Box<Place>,
+    },
     /// The normal equations of fibre angles cannot be solved.
     #[error("the normal equations of the fibre angles cannot be solved: {message}")]
     FibreSystem {
@@ -962,6 +970,7 @@ impl Error {
             Error::Axes { .. } => "M014",
             Error::NoAxes { .. } => "K005",
             Error::FibreSystem { .. } => "F010",
+            Error::UnlikeDirections { .. } => "G026",
             Error::FitNotConverged { .. } => "F002",
             Error::OuterNotConverged { .. } => "F014",
             Error::NoMarkersInFrame { .. } => "F003",
@@ -1025,6 +1034,7 @@ impl Error {
             | Error::MarkerFarFromSurface { place, .. }
             | Error::NothingToMatch { place }
             | Error::NoAxes { place, .. }
+            | Error::UnlikeDirections { place, .. }
             | Error::OuterNotConverged { place, .. }
             | Error::NoSuchFrame { place, .. } => Some(place),
             Error::MuscleOutside(details) => Some(&details.place),

@@ -153,6 +153,9 @@ impl Error {
                  field of vectors at the nodes of an EX file is read; write field = \"..\" to choose one of several"
                     .into(),
             ),
+            Error::UnlikeDirections { .. } => Some(
+                "write field = \"trilinear\" in [fibres], or give the elements local directions that continue each other".into(),
+            ),
             Error::NoAxes { .. } => Some(
                 "check the units of [[fibres.data]] and the place of the mesh; outside = { project_mm = .. } uses axes near it"
                     .into(),

@@ -6,7 +6,7 @@
 //! the fibre turns along) keeps half turns of its own at some corners.
 
 use super::embed::{Sample, Samples};
-use super::normal::{Angles, Corners};
+use super::space::Angles;
 use crate::mesh::element::ends;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, VecDeque};
@@ -67,11 +67,11 @@ fn turn(samples: &[Sample]) -> Option<[f64; 3]> {
 }
 
 /// Makes the angles at the nodes continuous, beginning at node `first`, and tells the half turns that are left at corners.
-pub fn unwrap(samples: &Samples, plain: &Corners, angles: &mut Angles, first: usize) -> Corners {
+pub fn unwrap(samples: &Samples, corners: &[[usize; 8]], angles: &mut Angles, first: usize) -> Vec<[i32; 8]> {
     let turns: Vec<Option<[f64; 3]>> = (0..samples.elements()).into_par_iter().map(|e| turn(samples.of(e))).collect();
     // votes of the elements for the half turns along each edge, from the lower to the higher node
     let mut votes: BTreeMap<(usize, usize), BTreeMap<i32, f64>> = BTreeMap::new();
-    for (e, nodes) in plain.nodes.iter().enumerate() {
+    for (e, nodes) in corners.iter().enumerate() {
         let sure = match turns[e] {
             Some(_) => samples.of(e).len().min(MOST) as f64,
             None => 1e-3,
@@ -128,8 +128,7 @@ pub fn unwrap(samples: &Samples, plain: &Corners, angles: &mut Angles, first: us
         angles[0] += PI * f64::from(*k);
         angles[1] *= if k % 2 == 0 { 1.0 } else { -1.0 };
     }
-    let mut corners = plain.clone();
-    for (nodes, turns) in plain.nodes.iter().zip(&mut corners.turns) {
+    let left = |nodes: &[usize; 8]| {
         // half turns along edges from corner 0, less those that the nodes have
         let mut local = [0; 8];
         for corner in 1..8 {
@@ -140,7 +139,7 @@ pub fn unwrap(samples: &Samples, plain: &Corners, angles: &mut Angles, first: us
         let left: [i32; 8] = std::array::from_fn(|c| local[c] - (half_turns[nodes[c]] - half_turns[nodes[0]]));
         // the element as a whole may turn: most corners are to have none
         let common = (0..8).max_by_key(|c| (left.iter().filter(|k| **k == left[*c]).count(), 8 - c));
-        *turns = left.map(|k| k - left[common.unwrap_or_default()]);
-    }
-    corners
+        left.map(|k| k - left[common.unwrap_or_default()])
+    };
+    corners.iter().map(left).collect()
 }

@@ -2,9 +2,10 @@
 
 use super::descent::Search;
 use super::embed::Sample;
-use super::normal::{Angles, Sums, misfit};
+use super::misfit::misfit;
+use super::normal::Sums;
+use super::space::Angles;
 use crate::error::Result;
-use crate::mesh::element::{Element, Trilinear};
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 use rayon::prelude::*;
@@ -12,9 +13,11 @@ use rayon::prelude::*;
 /// The change of an angle from node to node that is thought possible where there are no data, radians: 45 degrees.
 const POSSIBLE: f64 = std::f64::consts::FRAC_PI_4;
 /// Angles with a standard deviation above this, radians, with nothing but the data and [`POSSIBLE`] to go by, are not
-/// determined by the data: 25 degrees. A node without data has at least 45 / sqrt(8/3) = 27.6 degrees, 8/3 being the diagonal of
-/// the smoothness at a node of eight elements, even if all its neighbours are known.
+/// determined by the data: 25 degrees. A node without data has at least 45 / sqrt(8/3) = 27.6 degrees, [`TRILINEAR`] being the
+/// diagonal of the smoothness at a node of eight elements, even if all its neighbours are known.
 const DETERMINED: f64 = 25.0 / 180.0 * std::f64::consts::PI;
+/// The smoothness of a value at a node of eight trilinear elements; that of other fields is brought to it.
+const TRILINEAR: f64 = 8.0 / 3.0;
 /// The least standard deviation of the data that is believed, radians: a tenth of a degree.
 const LEAST_NOISE: f64 = 1.745e-3;
 
@@ -27,19 +30,19 @@ pub struct Certainty {
     pub determined: Vec<bool>,
 }
 
-/// The diagonal of the inverse.
+/// The diagonal of the inverse at the values of the nodes.
 fn variances(search: &Search, normal: &[f64], lambda: f64, k: usize) -> Result<Vec<f64>> {
     const AT_ONCE: usize = 64;
-    let factor = search.pattern.factor(normal, lambda, &search.smooth[k], search.fixed)?;
-    let nodes = search.pattern.nodes();
-    let parts: Vec<Vec<f64>> = (0..nodes.div_ceil(AT_ONCE))
-        .into_par_iter()
-        .map(|part| {
-            let first = AT_ONCE * part;
-            let count = AT_ONCE.min(nodes - first);
-            let mut columns = Mat::from_fn(nodes, count, |i, j| if i == first + j { 1.0 } else { 0.0 });
+    let factor = search.pattern.factor(normal, lambda, &search.roughness.matrices[k], search.fixed)?;
+    let parameters = search.pattern.parameters();
+    let parts: Vec<Vec<f64>> = search
+        .space
+        .values
+        .par_chunks(AT_ONCE)
+        .map(|values| {
+            let mut columns = Mat::from_fn(parameters, values.len(), |i, j| if i == values[j] { 1.0 } else { 0.0 });
             factor.solve_in_place(columns.as_mut());
-            (0..count).map(|j| columns[(first + j, j)]).collect()
+            values.iter().enumerate().map(|(j, value)| columns[(*value, j)]).collect()
         })
         .collect();
     Ok(parts.concat())
@@ -54,37 +57,31 @@ fn variances(search: &Search, normal: &[f64], lambda: f64, k: usize) -> Result<V
 /// [`Error::FibreSystem`](crate::Error::FibreSystem).
 pub fn certainty(search: &Search, sums: &Sums, lambda: f64, noise: f64) -> Result<Certainty> {
     let believed = noise.max(LEAST_NOISE);
-    let weak = (believed / POSSIBLE).powi(2);
-    let mut certainty = Certainty { sd: Vec::new(), determined: vec![true; search.pattern.nodes()] };
+    let weak = (believed / POSSIBLE).powi(2) * TRILINEAR / search.roughness.of_a_node();
+    let fixed: Vec<bool> = search.space.values.iter().map(|value| search.fixed[*value]).collect();
+    let mut certainty = Certainty { sd: Vec::new(), determined: vec![true; fixed.len()] };
     for k in 0..search.sought {
         let fitted = variances(search, &sums.normal[k], lambda, k)?;
         let alone = variances(search, &sums.normal[k], weak, k)?;
         let none = |fixed: bool, sd: f64| if fixed { 0.0 } else { sd };
-        certainty.sd.push(
-            fitted.iter().zip(search.fixed).map(|(variance, fixed)| none(*fixed, noise * variance.sqrt())).collect(),
-        );
-        for ((determined, variance), fixed) in certainty.determined.iter_mut().zip(&alone).zip(search.fixed) {
+        certainty
+            .sd
+            .push(fitted.iter().zip(&fixed).map(|(variance, fixed)| none(*fixed, noise * variance.sqrt())).collect());
+        for ((determined, variance), fixed) in certainty.determined.iter_mut().zip(&alone).zip(&fixed) {
             *determined &= none(*fixed, believed * variance.sqrt()) <= DETERMINED;
         }
     }
     Ok(certainty)
 }
 
-/// The angular errors of all samples at some angles, in their order, radians.
-pub fn errors(search: &Search, angles: &Angles) -> Vec<f64> {
-    errors_of(search, angles, &search.samples.all)
-}
-
-fn errors_of(search: &Search, angles: &Angles, samples: &[Sample]) -> Vec<f64> {
-    let one = |sample: &Sample| misfit(at(search, angles, sample), sample.axis).theta;
-    samples.par_iter().map(one).collect()
-}
-
-/// A and B at a sample.
-pub fn at(search: &Search, angles: &Angles, sample: &Sample) -> [f64; 2] {
-    let corners = search.corners.angles(sample.element as usize, angles);
-    let psi = Trilinear.values(sample.xi);
-    std::array::from_fn(|k| (0..8).map(|c| psi[c] * corners[c][k]).sum())
+/// The angular errors at some angles of the samples that `take` takes, in their order, radians.
+pub fn errors(search: &Search, angles: &Angles, take: impl Fn(&Sample) -> bool + Sync) -> Vec<f64> {
+    let of_element = |e: usize| {
+        let local = search.space.local(e, angles);
+        let taken = search.samples.of(e).iter().filter(|sample| take(sample));
+        taken.map(|sample| misfit(search.space.at(&local, sample.xi), sample.axis).theta).collect::<Vec<_>>()
+    };
+    (0..search.samples.elements()).into_par_iter().flat_map_iter(of_element).collect()
 }
 
 /// Which part of the data a sample is in: all of a group in the same.
@@ -101,15 +98,13 @@ fn fold(sample: &Sample, folds: usize) -> usize {
 /// # Errors
 /// [`Error::FibreSystem`](crate::Error::FibreSystem).
 pub fn held_out(search: &Search, angles: &Angles, sums: &Sums, lambda: f64, folds: usize) -> Result<Vec<f64>> {
-    let mut errors = Vec::with_capacity(search.samples.all.len());
+    let mut all = Vec::with_capacity(search.samples.all.len());
     for part in 0..folds {
         let mut rest = sums.clone();
         rest.add(-1.0, &search.sums(angles, |sample| fold(sample, folds) == part));
         let step = search.step(angles, &rest, lambda)?;
         let without = search.moved(angles, &step, 1.0);
-        let out: Vec<Sample> =
-            search.samples.all.iter().filter(|sample| fold(sample, folds) == part).copied().collect();
-        errors.extend(errors_of(search, &without, &out));
+        all.extend(errors(search, &without, |sample| fold(sample, folds) == part));
     }
-    Ok(errors)
+    Ok(all)
 }

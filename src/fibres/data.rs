@@ -87,8 +87,7 @@ pub fn read(files: &[FibreDataSpec]) -> Result<Axes> {
         let extension = spec.file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         let field = spec.field.as_deref();
         let read = match extension.as_deref() {
-            Some("vtk") => vtk::read_legacy(&spec.file, field),
-            Some("vtu" | "vtp") => vtk::read_xml(&spec.file, field),
+            Some("vtk" | "vtu" | "vtp") => vtk::read(&spec.file, field),
             Some("exf") => exf::read(&spec.file, field),
             _ => csv::read(&spec.file),
         };

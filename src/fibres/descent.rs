@@ -1,33 +1,45 @@
-//! Gauss-Newton steps on the true angular error.
+//! Gauss-Newton steps on the true angular error, as an argmin solver.
+//!
+//! The residuals of a million axes are summed up as they come, and the normal equations are sparse: argmin's own
+//! Gauss-Newton, which wants both as dense matrices, does not serve.
 
 use super::embed::{Sample, Samples};
-use super::normal::{Angles, Corners, Pattern, Sums, roughness, solve, sums};
-use crate::error::Result;
+use super::normal::{Sums, sums};
+use super::pattern::{Pattern, solve};
+use super::roughness::Roughness;
+use super::space::{Angles, Space};
+use crate::error::{Error, Result};
 use crate::scene::LossSpec;
+use argmin::core::{
+    Error as ArgminError, Executor, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus,
+};
+use argmin::kv;
 
 /// A step of every angle that is smaller than this ends the search, radians.
 const TOLERANCE: f64 = 1e-8;
 /// A step that lowers the sum by less than this part of it ends the search: it is a millionth of what the data leave open.
 const GAIN: f64 = 1e-12;
 /// The most halvings of a step.
-const HALVINGS: usize = 12;
+const HALVINGS: u64 = 12;
+/// A search whose steps no longer go down has converged where they are smaller than this, radians.
+const SMALL: f64 = 1e-4;
 
 /// What is minimised, but for the smoothness.
 pub struct Search<'a> {
-    /// Where pairs of nodes stand in matrices.
+    /// Where pairs of parameters stand in matrices.
     pub pattern: &'a Pattern,
     /// The data.
     pub samples: &'a Samples,
-    /// Nodes and half turns at the corners of elements.
-    pub corners: &'a Corners,
+    /// How angles follow from parameters.
+    pub space: &'a Space,
     /// How an error counts.
     pub loss: LossSpec,
     /// 1: only A is sought. 2: A and B.
     pub sought: usize,
-    /// Nodes whose angles do not change.
+    /// Parameters that do not change.
     pub fixed: &'a [bool],
-    /// The matrices of the smoothness, per angle.
-    pub smooth: Vec<Vec<f64>>,
+    /// The smoothness.
+    pub roughness: &'a Roughness,
 }
 
 /// How a search ended.
@@ -49,19 +61,19 @@ impl Search<'_> {
 
     /// The sums at some angles, over the samples that `take` takes.
     pub fn sums(&self, angles: &Angles, take: impl Fn(&Sample) -> bool + Sync) -> Sums {
-        sums(self.pattern, self.samples, self.corners, angles, self.loss, self.sought, take)
+        sums(self.pattern, self.samples, self.space, angles, self.loss, self.sought, take)
     }
 
-    /// The Gauss-Newton step from some angles, per sought angle and node; `sums` are those there.
+    /// The Gauss-Newton step from some angles, per sought angle and parameter; `sums` are those there.
     ///
     /// # Errors
-    /// [`Error::FibreSystem`](crate::Error::FibreSystem).
+    /// [`Error::FibreSystem`].
     pub fn step(&self, angles: &Angles, sums: &Sums, lambda: f64) -> Result<Vec<Vec<f64>>> {
-        let (_, rough) = roughness(self.corners, angles, self.sought);
+        let (_, rough) = self.roughness.at(self.space, angles);
         let one = |k: usize| {
-            let factor = self.pattern.factor(&sums.normal[k], lambda, &self.smooth[k], self.fixed)?;
+            let factor = self.pattern.factor(&sums.normal[k], lambda, &self.roughness.matrices[k], self.fixed)?;
             let right: Vec<f64> = (0..angles.len())
-                .map(|n| if self.fixed[n] { 0.0 } else { sums.gradient[k][n] - lambda * rough[k][n] })
+                .map(|p| if self.fixed[p] { 0.0 } else { sums.gradient[k][p] - lambda * rough[k][p] })
                 .collect();
             Ok(solve(&factor, &right))
         };
@@ -77,36 +89,109 @@ impl Search<'_> {
         moved
     }
 
-    /// Goes downhill until steps are small, at most `most` of them. A step that does not go down is halved.
+    /// What is minimised, where the sums are these.
+    pub fn value(&self, angles: &Angles, sums: &Sums, lambda: f64) -> f64 {
+        sums.cost + lambda * self.roughness.at(self.space, angles).0
+    }
+
+    /// Goes downhill until steps are small, at most `most` of them.
     ///
     /// # Errors
-    /// [`Error::FibreSystem`](crate::Error::FibreSystem).
+    /// [`Error::FibreSystem`].
     pub fn descend(&self, angles: &mut Angles, lambda: f64, most: usize) -> Result<Descent> {
-        let value =
-            |sums: &Sums, angles: &Angles| sums.cost + lambda * roughness(self.corners, angles, self.sought).0;
-        let mut sums = self.sums(angles, |_| true);
-        let mut now = value(&sums, angles);
-        for steps in 0..most {
-            let step = self.step(angles, &sums, lambda)?;
-            let longest = step.iter().flatten().fold(0.0, |longest: f64, x| longest.max(x.abs()));
-            // a step of more than a radian leaves the chart in which it was made
-            let mut part = if longest > 1.0 { 1.0 / longest } else { 1.0 };
-            let (mut better, before) = (false, now);
-            for _ in 0..HALVINGS {
-                let trial = self.moved(angles, &step, part);
-                let there = self.sums(&trial, |_| true);
-                let then = value(&there, &trial);
-                // of equal values the newer is as good: at the bottom rounding decides
-                if then <= now * (1.0 + 1e-12) {
-                    (*angles, sums, now, better) = (trial, there, then, true);
-                    break;
+        let begun = self.sums(angles, |_| true);
+        let solver = Damped { sums: begun, settled: None };
+        let found = Executor::new(Objective { search: self, lambda }, solver)
+            .configure(|state: AngleState| state.param(std::mem::take(angles)).max_iters(most as u64))
+            .ctrlc(false)
+            .timer(false)
+            .run()
+            .map_err(|error| match error.downcast::<Error>() {
+                Ok(error) => error,
+                Err(error) => Error::FibreSystem { message: error.to_string().into() },
+            })?;
+        let mut state = found.state;
+        let lost = || Error::FibreSystem { message: "the search lost its angles".into() };
+        *angles = state.take_param().ok_or_else(lost)?;
+        let converged = found.solver.settled == Some(true);
+        Ok(Descent { steps: state.get_iter() as usize, converged, sums: found.solver.sums })
+    }
+}
+
+/// A search with its smoothness.
+struct Objective<'s, 'a> {
+    search: &'s Search<'a>,
+    lambda: f64,
+}
+
+/// argmin's state for this solver: of a place nothing but its parameters and its value.
+type AngleState = IterState<Angles, (), (), (), (), f64>;
+
+/// Gauss-Newton steps; one that does not go down is halved.
+struct Damped {
+    /// The sums where the search stands.
+    sums: Sums,
+    /// Whether it converged, once it ended.
+    settled: Option<bool>,
+}
+
+impl<'s, 'a> Solver<Objective<'s, 'a>, AngleState> for Damped {
+    fn name(&self) -> &str {
+        "damped Gauss-Newton"
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Problem<Objective<'s, 'a>>,
+        mut state: AngleState,
+    ) -> std::result::Result<(AngleState, Option<KV>), ArgminError> {
+        let angles = state.take_param().ok_or_else(|| ArgminError::msg("a search starts from angles"))?;
+        let sums = &self.sums;
+        let cost = problem.problem("cost_count", |p| Ok(p.search.value(&angles, sums, p.lambda)))?;
+        Ok((state.param(angles).cost(cost), None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<Objective<'s, 'a>>,
+        mut state: AngleState,
+    ) -> std::result::Result<(AngleState, Option<KV>), ArgminError> {
+        let angles = state.take_param().ok_or_else(|| ArgminError::msg("the state of the search is incomplete"))?;
+        let before = state.get_cost();
+        let sums = &self.sums;
+        let step = problem.problem("step_count", |p| Ok(p.search.step(&angles, sums, p.lambda)?))?;
+        let longest = step.iter().flatten().fold(0.0, |longest: f64, x| longest.max(x.abs()));
+        // a step of more than a radian leaves the chart in which it was made
+        let mut part = if longest > 1.0 { 1.0 / longest } else { 1.0 };
+        for halvings in 0..HALVINGS {
+            let (trial, there, after) = problem.problem("cost_count", |p| {
+                let trial = p.search.moved(&angles, &step, part);
+                let there = p.search.sums(&trial, |_| true);
+                let after = p.search.value(&trial, &there, p.lambda);
+                Ok((trial, there, after))
+            })?;
+            // of equal values the newer is as good: at the bottom rounding decides
+            if after <= before * (1.0 + 1e-12) {
+                self.sums = there;
+                if longest < TOLERANCE || (part == 1.0 && before - after <= GAIN * before) {
+                    self.settled = Some(true);
                 }
-                part *= 0.5;
+                let report = kv!("step" => longest; "halvings" => halvings;);
+                return Ok((state.param(trial).cost(after), Some(report)));
             }
-            if !better || longest < TOLERANCE || (part == 1.0 && before - now <= GAIN * before) {
-                return Ok(Descent { steps: steps + 1, converged: better || longest < 1e-4, sums });
-            }
+            part *= 0.5;
         }
-        Ok(Descent { steps: most, converged: false, sums })
+        self.settled = Some(longest < SMALL);
+        Ok((state.param(angles).cost(before), None))
+    }
+
+    fn terminate(&mut self, _state: &AngleState) -> TerminationStatus {
+        match self.settled {
+            Some(true) => TerminationStatus::Terminated(TerminationReason::SolverConverged),
+            Some(false) => {
+                TerminationStatus::Terminated(TerminationReason::SolverExit("no step lowers the errors".into()))
+            }
+            None => TerminationStatus::NotTerminated,
+        }
     }
 }

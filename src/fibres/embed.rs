@@ -107,7 +107,6 @@ pub fn across_and_up(a: f64, b: f64, v: Vector) -> [f64; 2] {
 /// Finds every axis in the mesh. The sheet axes, where there are any, are samples of their own in the second list: their
 /// elements, and their axes as vectors in the frame, not yet across the fibre.
 pub fn embed(locator: &Locator<'_>, axes: &[Axis], rule: OutsideSpec) -> (Samples, Samples, Outside) {
-    let mesh = locator.mesh();
     let found: Vec<(Option<Sample>, Option<Sample>, Option<f64>)> = axes
         .par_iter()
         .map(|axis| {
@@ -123,7 +122,7 @@ pub fn embed(locator: &Locator<'_>, axes: &[Axis], rule: OutsideSpec) -> (Sample
             if !used {
                 return (None, None, distance);
             }
-            let frame = frame(&mesh.jacobian(at));
+            let frame = frame(&locator.jacobian(at));
             let sample = |v: Vector| Sample {
                 element: at.element as u32,
                 group: axis.group,
@@ -144,7 +143,7 @@ pub fn embed(locator: &Locator<'_>, axes: &[Axis], rule: OutsideSpec) -> (Sample
             _ => [distances().fold(f64::INFINITY, f64::min), distances().fold(0.0, f64::max)],
         },
     };
-    let elements = mesh.elements();
+    let elements = locator.mesh().elements();
     let fibres = Samples::new(found.iter().filter_map(|(fibre, _, _)| *fibre).collect(), elements);
     let sheets = Samples::new(found.iter().filter_map(|(_, sheet, _)| *sheet).collect(), elements);
     (fibres, sheets, outside)

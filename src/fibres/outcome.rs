@@ -54,6 +54,8 @@ pub struct FibreFit {
     pub converged: bool,
     /// What is to be known about it.
     pub warnings: Vec<Warning>,
+    /// What its parts took, s, in their order.
+    pub stages: Vec<(&'static str, f64)>,
 }
 
 /// The fitted angles of a node.

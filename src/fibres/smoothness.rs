@@ -4,14 +4,16 @@
 //! trace of (H + lambda K)^-1 H: how many numbers the data determine.
 
 use super::descent::Search;
-use super::normal::{Angles, Sums, roughness};
+use super::normal::Sums;
+use super::pattern::solve;
+use super::space::Angles;
 use crate::error::Result;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
 
 /// Powers of ten of the smoothness that are tried.
 const POWERS: std::ops::RangeInclusive<i32> = -12..=6;
-/// Meshes with so few nodes have an exact trace.
+/// So few parameters have an exact trace.
 const EXACT: usize = 300;
 /// Random vectors for the trace of larger ones (Hutchinson 1990).
 const PROBES: usize = 32;
@@ -39,11 +41,11 @@ pub struct Trace {
 impl Trace {
     /// For the matrices of some sums.
     pub fn new(search: &Search, sums: &Sums) -> Trace {
-        let nodes = search.pattern.nodes();
-        let (count, factor) = if nodes <= EXACT { (nodes, 1.0) } else { (PROBES, 1.0 / PROBES as f64) };
+        let parameters = search.pattern.parameters();
+        let (count, factor) = if parameters <= EXACT { (parameters, 1.0) } else { (PROBES, 1.0 / PROBES as f64) };
         let mut state = 1_u64;
-        let vectors = Mat::from_fn(nodes, count, |i, j| {
-            if nodes <= EXACT {
+        let vectors = Mat::from_fn(parameters, count, |i, j| {
+            if parameters <= EXACT {
                 return if i == j { 1.0 } else { 0.0 };
             }
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -52,11 +54,11 @@ impl Trace {
         let image = |normal: &Vec<f64>| {
             let columns: Vec<Vec<f64>> = (0..count)
                 .map(|j| {
-                    let column: Vec<f64> = (0..nodes).map(|i| vectors[(i, j)]).collect();
+                    let column: Vec<f64> = (0..parameters).map(|i| vectors[(i, j)]).collect();
                     search.pattern.apply(normal, &column)
                 })
                 .collect();
-            Mat::from_fn(nodes, count, |i, j| if search.fixed[i] { 0.0 } else { columns[j][i] })
+            Mat::from_fn(parameters, count, |i, j| if search.fixed[i] { 0.0 } else { columns[j][i] })
         };
         let images = sums.normal.iter().map(image).collect();
         Trace { vectors, images, factor }
@@ -68,17 +70,18 @@ impl Trace {
     /// [`Error::FibreSystem`](crate::Error::FibreSystem).
     pub fn score(&self, search: &Search, angles: &Angles, sums: &Sums, smoothness: f64) -> Result<Tried> {
         let lambda = search.lambda(smoothness);
-        let (_, rough) = roughness(search.corners, angles, search.sought);
+        let (_, rough) = search.roughness.at(search.space, angles);
         let (mut squares, mut freedom) = (sums.squares, 0.0);
         for k in 0..search.sought {
-            let factor = search.pattern.factor(&sums.normal[k], lambda, &search.smooth[k], search.fixed)?;
+            let factor =
+                search.pattern.factor(&sums.normal[k], lambda, &search.roughness.matrices[k], search.fixed)?;
             let right: Vec<f64> = (0..angles.len())
                 .map(|n| if search.fixed[n] { 0.0 } else { sums.gradient[k][n] - lambda * rough[k][n] })
                 .collect();
-            let step = super::normal::solve(&factor, &right);
+            let step = solve(&factor, &right);
             let image = search.pattern.apply(&sums.normal[k], &step);
-            let per_node = |n: usize| step[n] * (image[n] - 2.0 * sums.gradient[k][n]);
-            squares += (0..angles.len()).map(per_node).sum::<f64>();
+            let of_parameter = |n: usize| step[n] * (image[n] - 2.0 * sums.gradient[k][n]);
+            squares += (0..angles.len()).map(of_parameter).sum::<f64>();
             let mut solved = self.images[k].clone();
             factor.solve_in_place(solved.as_mut());
             let column = |j: usize| (0..solved.nrows()).map(|i| self.vectors[(i, j)] * solved[(i, j)]).sum::<f64>();

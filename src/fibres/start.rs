@@ -2,23 +2,19 @@
 
 use super::data::principal;
 use super::embed::{Samples, angles_of};
-use super::normal::{Angles, Corners, Pattern, smooth, solve};
+use super::pattern::{Pattern, solve};
+use super::roughness::Roughness;
+use super::space::{Angles, Space};
 use crate::error::Result;
 use crate::mesh::element::{Element, Trilinear};
 use rayon::prelude::*;
 
-/// Angles (A, B) at the nodes, A within (-pi/2, pi/2]: the principal axes of the fitted tensors, in the plane (f1, f2) if only A
+/// Angles (A, B) at the nodes of a trilinear space, A within (-pi/2, pi/2]: the principal axes of the fitted tensors, in the plane (f1, f2) if only A
 /// is sought; the smoothness is as of [`super::descent::Search`].
 ///
 /// # Errors
 /// [`Error::FibreSystem`](crate::Error::FibreSystem).
-pub fn start(
-    pattern: &Pattern,
-    samples: &Samples,
-    corners: &Corners,
-    sought: usize,
-    smoothness: f64,
-) -> Result<Angles> {
+pub fn start(pattern: &Pattern, samples: &Samples, space: &Space, sought: usize, smoothness: f64) -> Result<Angles> {
     /// m m^T of an axis: 11, 22, 33, 12, 23, 13.
     fn tensor([x, y, z]: [f64; 3]) -> [f64; 6] {
         [x * x, y * y, z * z, x * y, y * z, x * z]
@@ -41,22 +37,17 @@ pub fn start(
             (normal, right)
         })
         .collect();
-    let mut normal = vec![0.0; pattern.len()];
-    let mut right = vec![vec![0.0; pattern.nodes()]; 6];
+    let mut normal = pattern.zeros();
+    let mut right = vec![vec![0.0; pattern.parameters()]; 6];
     for (e, (of_element, tensors)) in parts.iter().enumerate() {
-        let nodes = corners.nodes[e];
-        for i in 0..8 {
-            (0..6).for_each(|k| right[k][nodes[i]] += tensors[k][i]);
-            for j in 0..8 {
-                if nodes[i] >= nodes[j] {
-                    normal[pattern.place(e, i, j)] += of_element[i][j];
-                }
-            }
+        pattern.scatter(space, e, 0, |i, j| of_element[i][j], &mut normal);
+        for (i, node) in space.nodes[e].iter().enumerate() {
+            (0..6).for_each(|k| right[k][*node] += tensors[k][i]);
         }
     }
-    let smooth = smooth(pattern, corners, 1);
+    let roughness = Roughness::new(space, pattern, 1);
     let lambda = smoothness * samples.all.len() as f64 / samples.elements() as f64;
-    let factor = pattern.factor(&normal, lambda, &smooth[0], &vec![false; pattern.nodes()])?;
+    let factor = pattern.factor(&normal, lambda, &roughness.matrices[0], &vec![false; pattern.parameters()])?;
     let fitted: Vec<Vec<f64>> = right.iter().map(|right| solve(&factor, right)).collect();
     let at_node = |n: usize| {
         let [xx, yy, zz, xy, yz, xz] = std::array::from_fn(|k| fitted[k][n]);
@@ -66,5 +57,5 @@ pub fn start(
         let [a, b, _] = angles_of(principal(nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)), None);
         [a, b]
     };
-    Ok((0..pattern.nodes()).map(at_node).collect())
+    Ok((0..pattern.parameters()).map(at_node).collect())
 }

@@ -29,34 +29,33 @@ pub(super) struct Dataset {
 
 impl Array {
     /// Whether it can hold directions: vectors, or tensors with 6 or 9 components.
-    fn is_direction(&self) -> bool {
+    pub fn is_direction(&self) -> bool {
         matches!(self.components, 3 | 6 | 9)
     }
 }
 
-/// Reads a VTU or VTP file.
+/// Reads the directions of a VTU or VTP file, or of a legacy VTK file, ASCII or binary.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Axes`] where it is not such a file, or where it is not clear what to read of it.
-pub fn read_xml(path: &Path, field: Option<&str>) -> Result<Axes> {
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
-    let read = xml::read(&bytes).and_then(|dataset| axes(&dataset, field));
-    read.map_err(|message| Error::Axes { path: path.into(), message: message.into() })
+pub fn read(path: &Path, field: Option<&str>) -> Result<Axes> {
+    axes(&dataset(path)?, field).map_err(|message| Error::Axes { path: path.into(), message: message.into() })
 }
 
-/// Reads a legacy VTK file, ASCII or binary.
-///
-/// # Errors
-/// As [`read_xml`].
-pub fn read_legacy(path: &Path, field: Option<&str>) -> Result<Axes> {
+/// Reads a file, by its ending.
+pub(super) fn dataset(path: &Path) -> Result<Dataset> {
     let bytes = std::fs::read(path).map_err(|source| Error::Io { action: "read", path: path.into(), source })?;
-    let read = Legacy { bytes: &bytes, at: 0, binary: false }.read().and_then(|dataset| axes(&dataset, field));
+    let is_legacy = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("vtk"));
+    let read = match is_legacy {
+        true => Legacy { bytes: &bytes, at: 0, binary: false }.read(),
+        false => xml::read(&bytes),
+    };
     read.map_err(|message| Error::Axes { path: path.into(), message: message.into() })
 }
 
 /// The directions of a dataset: of the field with this name, or of the only one that can hold directions, or else its lines.
 /// A field `weight` of one component beside it is their weight.
-fn axes(dataset: &Dataset, field: Option<&str>) -> std::result::Result<Axes, String> {
+pub(super) fn axes(dataset: &Dataset, field: Option<&str>) -> std::result::Result<Axes, String> {
     let all = || dataset.on_points.iter().chain(&dataset.on_cells).filter(|array| array.is_direction());
     let names = || all().map(|array| array.name.as_str()).collect::<Vec<_>>().join(", ");
     let chosen = match field {

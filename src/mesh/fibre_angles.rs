@@ -1,6 +1,7 @@
-//! Fibre directions from Euler angles that are given at nodes and interpolated trilinearly (Wu et al. 2013, section 3.3).
+//! Fibre directions from Euler angles that are given at nodes and interpolated trilinearly (Wu et al. 2013, section 3.3), or as a
+//! tricubic Hermite.
 
-use super::element::{Element, Trilinear};
+use super::element::{Element, MAX_FUNCTIONS, TricubicHermite, Trilinear};
 use super::{Mesh, position_and_jacobian};
 use crate::math::tensor::{Matrix, Vector, cross, normalised};
 use std::collections::BTreeMap;
@@ -13,12 +14,15 @@ pub struct FibreAngles {
     /// Elements whose corners have other angles than their nodes: the same axes, with other half turns. A field that
     /// turns around on its way about a hole has them along a cut; most fields have none.
     pub own: BTreeMap<usize, [[f64; 3]; 8]>,
+    /// Of a tricubic Hermite field what its functions have in every element: value, d1, d2, d12, d3, d13, d23, d123 at each corner,
+    /// radians per unit xi. The values are those at the corners.
+    pub tricubic: Option<Vec<[[f64; 3]; MAX_FUNCTIONS]>>,
 }
 
 impl FibreAngles {
     /// Angles at nodes, one for all elements that meet there.
     pub fn at_nodes(nodes: Vec<[f64; 3]>) -> FibreAngles {
-        FibreAngles { nodes, own: BTreeMap::new() }
+        FibreAngles { nodes, own: BTreeMap::new(), tricubic: None }
     }
 
     /// The same angles everywhere.
@@ -33,14 +37,40 @@ impl FibreAngles {
 
     /// The angles at a point of an element.
     pub fn at(&self, mesh: &Mesh, element: usize, xi: [f64; 3]) -> [f64; 3] {
-        let values = Trilinear.values(xi);
-        let mut angles = [0.0; 3];
-        for (value, corner) in values.iter().zip(self.at_corners(mesh, element)) {
-            for (sum, angle) in angles.iter_mut().zip(corner) {
-                *sum += value * angle;
+        let sum = |values: &[f64], parameters: &[[f64; 3]]| {
+            let mut angles = [0.0; 3];
+            for (value, parameter) in values.iter().zip(parameters) {
+                for (sum, angle) in angles.iter_mut().zip(parameter) {
+                    *sum += value * angle;
+                }
+            }
+            angles
+        };
+        match &self.tricubic {
+            Some(locals) => sum(&TricubicHermite.values(xi), &locals[element]),
+            None => sum(&Trilinear.values(xi), &self.at_corners(mesh, element)),
+        }
+    }
+
+    /// Adds to A at every node what is given there, and between them trilinearly.
+    pub fn add(&mut self, mesh: &Mesh, nodes: &[f64]) {
+        self.nodes.iter_mut().zip(nodes).for_each(|(angles, more)| angles[0] += more);
+        for (element, own) in &mut self.own {
+            own.iter_mut().zip(mesh.corners[*element]).for_each(|(angles, node)| angles[0] += nodes[node]);
+        }
+        for (local, corners) in self.tricubic.iter_mut().flatten().zip(&mesh.corners) {
+            for (a, angles) in local.iter_mut().enumerate() {
+                let (corner, derivative) = (a / 8, a % 8);
+                // a derivative along an edge is the difference of its ends, a mixed one the difference of those
+                let parts = (0..8).filter(|part| part & derivative == *part);
+                angles[0] += parts
+                    .map(|part| {
+                        let sign = if (derivative & !part).count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+                        sign * nodes[corners[(corner & !derivative) | part]]
+                    })
+                    .sum::<f64>();
             }
         }
-        angles
     }
 
     /// The unit fibre direction at a point of an element with local reference parameters `local`.

@@ -2,7 +2,7 @@
 
 use super::bezier::bounding_box;
 use super::{MaterialPoint, Mesh, position_and_jacobian};
-use crate::math::tensor::{Vector, apply, apply_transposed, determinant, inverse, norm, subtract};
+use crate::math::tensor::{Matrix, Vector, apply, apply_transposed, determinant, inverse, norm, subtract};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, PointDistance, RTree};
 
@@ -64,18 +64,24 @@ impl<'m> Locator<'m> {
         let around = AABB::from_corners(x.map(|c| c - margin), x.map(|c| c + margin));
         let mut candidates: Vec<usize> = self.tree.locate_in_envelope_intersecting(around).map(|b| b.data).collect();
         candidates.sort_unstable();
-        for element in candidates {
-            if let Some(xi) = self.invert(element, x) {
-                return Some(MaterialPoint { element, xi });
-            }
-        }
-        None
+        // from the middle of each, which nearly always does; from elsewhere only where no element holds it then
+        let middle = || std::iter::once([0.5; 3]);
+        let elsewhere =
+            || (0..27).filter(|k| *k != 13).map(|k| [k % 3, k / 3 % 3, k / 9].map(|i| [0.1, 0.5, 0.9][i]));
+        let from_middle = candidates.iter().find_map(|element| Some((*element, self.invert(*element, x, middle())?)));
+        let found = from_middle.or_else(|| {
+            candidates.iter().find_map(|element| Some((*element, self.invert(*element, x, elsewhere())?)))
+        });
+        found.map(|(element, xi)| MaterialPoint { element, xi })
     }
 
-    /// Newton's method on x(xi) = x from the middle and, where that fails, from the corners and face centres.
-    fn invert(&self, element: usize, x: Vector) -> Option<[f64; 3]> {
-        let starts = std::iter::once([0.5; 3])
-            .chain((0..27).filter(|k| *k != 13).map(|k| [k % 3, k / 3 % 3, k / 9].map(|i| [0.1, 0.5, 0.9][i])));
+    /// dX/dxi at a material point, mm, as [`Mesh::jacobian`]: the parameters of elements are at hand here.
+    pub fn jacobian(&self, at: MaterialPoint) -> Matrix {
+        position_and_jacobian(self.mesh.element, &self.locals[at.element], at.xi).1
+    }
+
+    /// Newton's method on x(xi) = x from some places in turn.
+    fn invert(&self, element: usize, x: Vector, starts: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
         for start in starts {
             let mut xi = start;
             for _ in 0..30 {

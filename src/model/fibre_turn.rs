@@ -30,9 +30,6 @@ pub(super) fn turned(mesh: &Mesh, mut angles: FibreAngles, turn_deg: [f64; 4]) -
         (all + (0..3).map(|d| along[d] * part(d)).sum::<f64>()).to_radians()
     };
     let nodes: Vec<f64> = (0..mesh.nodes).map(turn).collect();
-    angles.nodes.iter_mut().zip(&nodes).for_each(|(angle, turn)| angle[0] += turn);
-    for (element, own) in &mut angles.own {
-        own.iter_mut().zip(mesh.corners[*element]).for_each(|(angle, node)| angle[0] += nodes[node]);
-    }
+    angles.add(mesh, &nodes);
     angles
 }

@@ -179,6 +179,13 @@ impl Model {
         &self.ingredients.controls
     }
 
+    /// The controls that are activations, not poses of bones.
+    pub fn activations(&self) -> impl Iterator<Item = usize> {
+        let pose = |bone: &Arc<Bone>| [bone.hinge().map(|h| h.control), bone.slide().map(|s| s.control)];
+        let poses: Vec<usize> = self.bones.iter().flat_map(pose).flatten().collect();
+        (0..self.controls().len()).filter(move |control| !poses.contains(control))
+    }
+
     /// Prescribed motion.
     pub fn supports(&self) -> &Supports {
         &self.ingredients.supports

@@ -7,7 +7,7 @@ use super::frame::{
 use super::run_folder::RunFolder;
 use super::tables::{
     ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
-    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, ProbeTable, write_cost,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, ProbeTable, storage, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
@@ -35,6 +35,8 @@ pub struct Record<'a> {
     outliers: Option<OutlierTable>,
     probe_table: Option<ProbeTable>,
     estimates: Option<EstimateTable>,
+    /// Time and activations of every frame that is done, for OpenSim.
+    activity: Vec<(f64, Vec<f64>)>,
     view: View,
     frames: usize,
     /// Time spent in writing, s.
@@ -77,6 +79,7 @@ impl<'a> Record<'a> {
             outliers: None,
             probe_table: (!probes.is_empty()).then(|| ProbeTable::create(run)).transpose()?,
             estimates: None,
+            activity: Vec::new(),
             view: View::new(run),
             frames: 0,
             seconds: 0.0,
@@ -129,7 +132,9 @@ impl<'a> Record<'a> {
     /// # Errors
     /// Where the row cannot be written.
     pub fn done(&mut self, frame: Frame, equilibrium: &Equilibrium, deviations: &[Option<f64>]) -> Result<()> {
-        self.activations.add(frame, &equilibrium.state.controls, deviations)
+        let controls = &equilibrium.state.controls;
+        self.activity.push((frame.time_s, self.model.activations().map(|k| controls[k]).collect()));
+        self.activations.add(frame, controls, deviations)
     }
 
     /// Writes what the markers of a frame tell; `names` are those of all controls and of all markers, `biases` one per control
@@ -194,11 +199,21 @@ impl<'a> Record<'a> {
         Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }
 
-    /// Writes the table of costs; `estimate` is the work and the seconds of estimates.
+    /// Time spent in writing so far, s.
+    pub fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    /// Writes `activations.sto`, whose head counts its rows, and the table of costs; `estimate` is the work and the seconds of estimates.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn finish(&self, work: &Work, estimate: Option<(&Work, f64)>) -> Result<()> {
+        let names: Vec<&str> = self.model.activations().map(|k| self.model.controls()[k].name.as_str()).collect();
+        if !names.is_empty() {
+            let text = storage(names.into_iter(), self.activity.iter().cloned());
+            self.run.write("tables/activations.sto", text)?;
+        }
         write_cost(self.run, self.model, work, self.seconds, estimate)
     }
 }

@@ -10,7 +10,16 @@ const SUB_FOLDERS: [&str; 3] = ["tables", "view", "view/linear"];
 /// Sub-folders that a run fills and a later one in the same place replaces.
 const REPLACED: [&str; 3] = ["tables", "view", "state"];
 /// Files of a run that one of another task, or one that fails, would not replace; the status, by which a run is known, goes last.
-const REMOVED: [&str; 6] = ["report.html", "study.md", "fibres.exf", "summary.txt", "manifest.json", "status.json"];
+const REMOVED: [&str; 8] = [
+    "log.jsonl",
+    "problem.lock.toml",
+    "report.html",
+    "study.md",
+    "fibres.exf",
+    "summary.txt",
+    "manifest.json",
+    "status.json",
+];
 /// What surely fits where a file of its length is already, bytes: a block of the disk.
 const BLOCK: usize = 4096;
 

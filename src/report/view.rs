@@ -4,7 +4,7 @@ use super::exf;
 use super::frame::{Frame, MarkerPair};
 use super::pvd::Collection;
 use super::run_folder::RunFolder;
-use super::vtu::{Grid, bezier, contact, linear, markers, muscles};
+use super::vtu::{Grid, bezier, contact, linear, markers, muscles, residuals};
 use crate::error::Result;
 use crate::model::{Model, State};
 use crate::term::contact::ContactPoint;
@@ -19,6 +19,7 @@ pub struct View {
     muscles: Series,
     contact: Series,
     markers: Series,
+    residuals: Series,
 }
 
 /// Files `<folder>/<name>_0000.vtu` and their list `<folder>/<name>.pvd`.
@@ -39,6 +40,7 @@ impl View {
             muscles: Series::new(folder.clone(), "muscles"),
             contact: Series::new(folder.clone(), "contact"),
             markers: Series::new(folder.clone(), "markers"),
+            residuals: Series::new(folder.clone(), "residuals"),
             folder,
         }
     }
@@ -56,7 +58,7 @@ impl View {
         markers: &[MarkerPair<'_>],
         contacts: &[Vec<ContactPoint>],
     ) -> Result<()> {
-        let View { folder, shape, linear, muscles, contact, markers: shown } = self;
+        let View { folder, shape, linear, muscles, contact, markers: shown, residuals: apart } = self;
         let time_s = frame.time_s;
         let exf = || exf::write(&folder.join(format!("result_{:04}.exf", frame.index)), model, state);
         let shape = || shape.add(frame, &bezier::shape(model, state, time_s));
@@ -70,6 +72,7 @@ impl View {
             }
             if !markers.is_empty() {
                 shown.add(frame, &markers::points(markers, time_s))?;
+                apart.add(frame, &residuals::lines(markers, time_s))?;
             }
             Ok(())
         };

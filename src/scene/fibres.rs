@@ -19,6 +19,8 @@ pub struct FibreProblem {
     pub body: FibreBody,
     /// Which angles are sought; the others are 0.
     pub angles: AnglesSpec,
+    /// How they are interpolated.
+    pub field: FieldSpec,
     /// The measurements, at least one file.
     pub data: Vec<FibreDataSpec>,
     /// What becomes of points outside the mesh.
@@ -42,8 +44,13 @@ pub struct FibreProblem {
 pub enum FibreBody {
     /// `[mesh]`.
     Mesh(MeshSpec),
-    /// The `[[muscle]]` that `[fibres] muscle` names; its own angles are not used.
-    Muscle(Box<MuscleSpec>),
+    /// A `[[muscle]]`.
+    Muscle {
+        /// That which `[fibres] muscle` names; its own angles are not used.
+        muscle: Box<MuscleSpec>,
+        /// `[mesh]`, where the file has it: a muscle of the face is made in it.
+        host: Option<MeshSpec>,
+    },
 }
 
 /// Which angles are sought: `[fibres] angles`.
@@ -55,6 +62,16 @@ pub enum AnglesSpec {
     AB,
     /// `["A", "B", "G"]`: sheets too.
     ABG,
+}
+
+/// How angles are interpolated: `[fibres] field`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FieldSpec {
+    /// Between values at the nodes.
+    Trilinear,
+    /// By values and derivatives at the nodes: C1.
+    Tricubic,
 }
 
 /// A file of measurements: `[[fibres.data]]`.
@@ -118,6 +135,19 @@ pub struct FixedNodeSpec {
     pub place: Place,
 }
 
+impl FieldSpec {
+    /// All, with the word of each.
+    pub const ALL: [(&str, FieldSpec); 2] = [("trilinear", FieldSpec::Trilinear), ("tricubic", FieldSpec::Tricubic)];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            FieldSpec::Trilinear => "trilinear",
+            FieldSpec::Tricubic => "tricubic",
+        }
+    }
+}
+
 impl AnglesSpec {
     /// All, with the letters of each.
     pub const ALL: [(AnglesSpec, &str); 3] = [(AnglesSpec::A, "A"), (AnglesSpec::AB, "AB"), (AnglesSpec::ABG, "ABG")];
@@ -177,28 +207,31 @@ pub(super) fn fibres(
         };
         let muscles = file.tables("muscle", |table| muscle(table, references, host.as_ref()));
         let body = match wanted {
-            Some((name, place)) => named(muscles?, name, place, mistakes),
+            Some((name, place)) => {
+                named(muscles?, name, place, mistakes).map(|muscle| FibreBody::Muscle { muscle, host })
+            }
             None => host.map(FibreBody::Mesh),
         };
-        let Settings { angles, data, outside, smoothness, loss, folds, fixed, place } = settings?;
+        let Settings { angles, field, data, outside, smoothness, loss, folds, fixed, place } = settings?;
         let (name, body) = (name?, body?);
-        Some(FibreProblem { name, body, angles, data, outside, smoothness, loss, folds, fixed, place })
+        Some(FibreProblem { name, body, angles, field, data, outside, smoothness, loss, folds, fixed, place })
     })
 }
 
-fn named(muscles: Vec<MuscleSpec>, name: String, place: Place, mistakes: &Mistakes) -> Option<FibreBody> {
+fn named(muscles: Vec<MuscleSpec>, name: String, place: Place, mistakes: &Mistakes) -> Option<Box<MuscleSpec>> {
     let known: Vec<String> = muscles.iter().map(|muscle| muscle.name.clone()).collect();
     let found = muscles.into_iter().find(|muscle| muscle.name == name);
     if found.is_none() {
         let help = super::references::help_for_name(&name, &known, "muscles");
         mistakes.add(Error::UnknownName { kind: "muscle", name, help, place });
     }
-    found.map(|muscle| FibreBody::Muscle(Box::new(muscle)))
+    found.map(Box::new)
 }
 
 /// What the table `[fibres]` says besides the muscle.
 struct Settings {
     angles: AnglesSpec,
+    field: FieldSpec,
     data: Vec<FibreDataSpec>,
     outside: OutsideSpec,
     smoothness: SmoothnessSpec,
@@ -218,8 +251,7 @@ fn settings(table: &mut Table, references: &References) -> Option<Settings> {
         let allowed = "[\"A\"], [\"A\", \"B\"] or [\"A\", \"B\", \"G\"]";
         found.map(|(spec, _)| *spec).or_else(|| item.out_of_range(&format!("{letters:?}"), allowed))
     });
-    let later = [("hermite", "tricubic Hermite angle fields")];
-    table.or("field", (), |item| item.choice(&[("trilinear", ())], &later));
+    let field = table.or("field", FieldSpec::Trilinear, |item| item.choice(&FieldSpec::ALL, &[]));
     let data = table.tables("data", |table| data(table, references));
     table.must_hold("data", "[[fibres.data]]\nfile = \"axes.csv\"\nunits = \"mm\"");
     let outside = table.or("outside", OutsideSpec::Drop, |item| match item.node.value {
@@ -255,6 +287,7 @@ fn settings(table: &mut Table, references: &References) -> Option<Settings> {
     });
     let settings = Settings {
         angles: angles?,
+        field: field?,
         data: data?,
         outside: outside?,
         smoothness: smoothness?,

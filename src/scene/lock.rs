@@ -8,18 +8,22 @@ use super::outer::{OuterSpec, OuterUnknown, OuterWhat};
 use super::spec::*;
 use super::units::Units;
 
+/// The first line.
+pub(super) const HEADER: &str =
+    "# Written by risorius: the whole problem, every default spelled out. It runs as it is.";
+
 /// A number with the fewest digits that give the same bits again.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-fn numbers(values: &[f64; 3]) -> String {
+pub(super) fn numbers(values: &[f64; 3]) -> String {
     let [x, y, z] = values;
     format!("[{x:?}, {y:?}, {z:?}]")
 }
 
 /// Text in quotes, as TOML escapes it.
-fn text(value: &str) -> String {
+pub(super) fn text(value: &str) -> String {
     let mut quoted = String::from("\"");
     for character in value.chars() {
         match character {
@@ -31,7 +35,7 @@ fn text(value: &str) -> String {
     quoted + "\""
 }
 
-fn path(path: &std::path::Path) -> String {
+pub(super) fn path(path: &std::path::Path) -> String {
     text(&path.to_string_lossy())
 }
 
@@ -62,7 +66,7 @@ impl Scene {
             warnings: _, // of this reading; a new one warns again
         } = self;
         let mut lines = vec![
-            "# Written by risorius: the whole problem, every default spelled out. It runs as it is.".to_string(),
+            HEADER.to_string(),
             format!("name = {}", text(name)),
             "\n[task]".into(),
             format!("kind = \"{}\"", task.word()),
@@ -122,7 +126,7 @@ impl Scene {
     }
 }
 
-fn geometry(geometry: &GeometrySpec) -> String {
+pub(super) fn geometry(geometry: &GeometrySpec) -> String {
     match geometry {
         GeometrySpec::Block(BlockSpec { origin_mm, size_mm, elements }) => {
             let (origin_mm, size_mm) = (numbers(origin_mm), numbers(size_mm));
@@ -205,7 +209,7 @@ fn region_lines(region: &RegionSpec, lines: &mut Vec<String>) {
     ]);
 }
 
-fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
+pub(super) fn muscle_lines(muscle: &MuscleSpec, lines: &mut Vec<String>) {
     let MuscleSpec {
         name,
         geometry: shape,

@@ -14,6 +14,7 @@ mod curves;
 mod effects;
 mod face;
 mod fibres;
+mod fibres_lock;
 mod interpret;
 mod lock;
 mod nearest;
@@ -30,7 +31,8 @@ mod units;
 pub use curves::Curves;
 pub use face::{FACE, built_in_face};
 pub use fibres::{
-    AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FixedNodeSpec, LossSpec, OutsideSpec, SmoothnessSpec,
+    AnglesSpec, FibreBody, FibreDataSpec, FibreProblem, FieldSpec, FixedNodeSpec, LossSpec, OutsideSpec,
+    SmoothnessSpec,
 };
 pub use objectives::{ClipSpec, EffortSpec, MarkerLossSpec, ObjectivesSpec, PriorSpec, SmoothSpec};
 pub use outer::{AngleMode, OuterSpec, OuterUnknown, OuterWhat};

@@ -1,21 +1,24 @@
-//! Fibre angles of an EX file: a field of the coordinate system `fibre`, in radians, trilinear in every element.
+//! Fibre angles of an EX file: a field of the coordinate system `fibre`, in radians, trilinear in every element or of a basis
+//! that a tricubic Hermite holds.
 
 use super::file::ExFile;
 use super::geometry::Geometry;
 use super::sums::{missing, unsupported};
 use crate::error::{Error, Place, Result};
 use crate::math::tensor::{Matrix, dot};
+use crate::mesh::element::MAX_FUNCTIONS;
 use crate::mesh::fibre_angles::{FibreAngles, axes};
 use std::collections::BTreeMap;
 
 impl ExFile {
     /// The angles of the field `field` at the nodes of a mesh from this file. The components are the fibre angle, the
     /// imbrication angle and the sheet angle, in this order; those that are not there are 0. A node may have several
-    /// versions that are the same axes: then elements keep their own.
+    /// versions that are the same axes: then elements keep their own. Where some component of some element is not trilinear, the
+    /// whole field is read as tricubic Hermite, which is the same field.
     ///
     /// # Errors
-    /// [`Error::ExField`] where there is no such field, [`Error::ExUnsupported`] where it is not one angle per node in
-    /// trilinear elements, [`Error::ExMissing`] where an element of the mesh or a node lacks it.
+    /// [`Error::ExField`] where there is no such field, [`Error::ExUnsupported`] where it is not one axis per node or
+    /// of another basis, [`Error::ExMissing`] where an element of the mesh or a node lacks it.
     pub fn angles(&self, field: &str, geometry: &Geometry) -> Result<FibreAngles> {
         let region = &self.regions[geometry.region];
         let elements = self.field_in_elements(region, field);
@@ -35,6 +38,10 @@ impl ExFile {
         }
         let mut nodes: Vec<Option<[f64; 3]>> = vec![None; geometry.mesh.nodes];
         let mut own = BTreeMap::new();
+        let components = || elements.iter().flat_map(|element| element.components);
+        let is_tricubic =
+            components().any(|component| matches!(&component.basis, Ok(basis) if !basis.is_trilinear()));
+        let mut tricubic = Vec::new();
         for (index, (identifier, corners)) in geometry.elements.iter().zip(&geometry.mesh.corners).enumerate() {
             let Some(element) = by_identifier.get(identifier) else {
                 return Err(missing(format!("field `{field}` in element {identifier}"), &Place::whole(&self.file)));
@@ -45,23 +52,22 @@ impl ExFile {
                 let help = "name a field of the coordinate system `fibre` with at most 3 components, in radians";
                 return Err(unsupported(construct, help, place));
             }
-            let mut angles = [[0.0; 3]; 8];
-            for (index, component) in element.components.iter().enumerate() {
-                if matches!(&component.basis, Ok(basis) if !basis.is_trilinear()) {
-                    let construct =
-                        format!("component `{}` of field `{field}` with a basis of higher order", component.name);
-                    return Err(unsupported(
-                        construct,
-                        "give fibre angles the basis l.Lagrange*l.Lagrange*l.Lagrange",
-                        &component.place,
-                    ));
-                }
-                let sums = self.sums(region, element, field, index)?;
-                for (corner, sum) in angles.iter_mut().zip(sums) {
+            let mut functions = [[0.0; 3]; MAX_FUNCTIONS];
+            for index in 0..element.components.len() {
+                let sums = match is_tricubic {
+                    true => self.hermite_sums(region, element, field, index)?,
+                    false => self.sums(region, element, field, index)?,
+                };
+                for (function, sum) in functions.iter_mut().zip(sums) {
                     for (key, scale) in sum {
-                        corner[index] += scale * self.value(region, field, index, key)?;
+                        function[index] += scale * self.value(region, field, index, key)?;
                     }
                 }
+            }
+            let per_node = if is_tricubic { 8 } else { 1 };
+            let angles = std::array::from_fn(|corner| functions[per_node * corner]);
+            if is_tricubic {
+                tricubic.push(functions);
             }
             for (node, here) in corners.iter().zip(&angles) {
                 let known = *nodes[*node].get_or_insert(*here);
@@ -80,7 +86,8 @@ impl ExFile {
                 own.insert(index, angles);
             }
         }
-        Ok(FibreAngles { nodes: nodes.into_iter().map(Option::unwrap_or_default).collect(), own })
+        let nodes = nodes.into_iter().map(Option::unwrap_or_default).collect();
+        Ok(FibreAngles { nodes, own, tricubic: is_tricubic.then_some(tricubic) })
     }
 }
 

@@ -13,7 +13,24 @@ pub(super) enum Basis1d {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Basis(pub [Basis1d; 3]);
 
+impl std::fmt::Display for Basis {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [a, b, c] = self.0.map(Basis1d::word);
+        write!(f, "{a}*{b}*{c}")
+    }
+}
+
 impl Basis1d {
+    /// As files have it.
+    fn word(self) -> &'static str {
+        match self {
+            Basis1d::Linear => "l.Lagrange",
+            Basis1d::Quadratic => "q.Lagrange",
+            Basis1d::CubicLagrange => "c.Lagrange",
+            Basis1d::CubicHermite => "c.Hermite",
+        }
+    }
+
     fn functions(self) -> usize {
         match self {
             Basis1d::Linear => 2,

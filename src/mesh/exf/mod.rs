@@ -24,6 +24,7 @@ mod coordinates;
 mod elements;
 mod file;
 mod geometry;
+mod inspect;
 mod jet;
 mod lines;
 mod nodes;
@@ -38,6 +39,7 @@ pub use convert::Conversion;
 pub use coordinates::Coordinates;
 pub use file::ExFile;
 pub use geometry::Geometry;
+pub use inspect::{ExContents, ExFieldContents, inspect};
 pub use write::{Points, write_mesh, write_points};
 pub use write_angles::write_angles;
 

@@ -4,6 +4,7 @@ use crate::fibres::streamlines::size;
 use crate::fibres::{FibreFit, measured as measured_axis};
 use crate::math::tensor::{Vector, add_scaled};
 use crate::mesh::MaterialPoint;
+use crate::mesh::element::ends;
 use crate::mesh::fibre_angles::axes;
 use crate::report::vtu::{CellKind, Field, Grid};
 
@@ -12,27 +13,38 @@ const HEXAHEDRON: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 /// More measured axes than this are thinned out.
 const MOST_AXES: usize = 20_000;
 
-/// Every element as a hexahedron with straight edges; elements do not share points, as the frames of the angles jump
-/// between them. On points: fibre, sheet, the angles (degrees), whether the data determine them, and the node.
+/// Parts of an element of a tricubic field along each direction.
+const PARTS: usize = 3;
+
+/// Every element as a hexahedron with straight edges, or where the field is tricubic as 3 x 3 x 3 of them; they do not share points,
+/// as the frames of the angles jump between elements. On points: fibre, sheet, the angles (degrees), and of the nearest node its
+/// name, the standard deviation of A and whether the data determine it.
 pub(super) fn field(fit: &FibreFit) -> Grid {
     let mesh = &fit.mesh;
     let (mut points, mut fibre, mut sheet, mut node) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut angles: [Vec<f64>; 3] = Default::default();
-    let (mut determined, mut sd) = (Vec::new(), Vec::new());
+    let (mut determined, mut sd, mut owner) = (Vec::new(), Vec::new(), Vec::new());
+    let parts = if fit.angles.tricubic.is_some() { PARTS } else { 1 };
     for element in 0..mesh.elements() {
-        let corners = fit.angles.at_corners(mesh, element);
-        for corner in HEXAHEDRON {
-            let xi = crate::mesh::element::ends(corner).map(|end| end as f64);
-            let at = MaterialPoint { element, xi };
-            let [along, across, _] = axes(&mesh.jacobian(at), corners[corner]);
-            points.push(mesh.position(at));
-            fibre.push(along);
-            sheet.push(across);
-            (0..3).for_each(|k| angles[k].push(corners[corner][k].to_degrees()));
-            let answer = &fit.nodes[mesh.corners[element][corner]];
-            determined.push(i64::from(answer.determined));
-            sd.push(answer.sd[0].unwrap_or(f64::NAN).to_degrees());
-            node.push(answer.name);
+        for part in 0..parts.pow(3) {
+            owner.push(element as i64);
+            let first = [part % parts, part / parts % parts, part / parts / parts];
+            for corner in HEXAHEDRON {
+                let end = ends(corner);
+                let xi = std::array::from_fn(|d| (first[d] + end[d]) as f64 / parts as f64);
+                let at = MaterialPoint { element, xi };
+                let here = fit.angles.at(mesh, element, xi);
+                let [along, across, _] = axes(&mesh.jacobian(at), here);
+                points.push(mesh.position(at));
+                fibre.push(along);
+                sheet.push(across);
+                (0..3).for_each(|k| angles[k].push(here[k].to_degrees()));
+                let nearest: usize = (0..3).map(|d| usize::from(xi[d] > 0.5) << d).sum();
+                let answer = &fit.nodes[mesh.corners[element][nearest]];
+                determined.push(i64::from(answer.determined));
+                sd.push(answer.sd[0].unwrap_or(f64::NAN).to_degrees());
+                node.push(answer.name);
+            }
         }
     }
     let [a, b, g] = angles;
@@ -51,7 +63,7 @@ pub(super) fn field(fit: &FibreFit) -> Grid {
             Field::integers("determined", determined),
             Field::integers("node", node),
         ],
-        on_cells: vec![Field::integers("element", (0..mesh.elements() as i64).collect())],
+        on_cells: vec![Field::integers("element", owner)],
     }
 }
 

@@ -19,6 +19,7 @@ mod objectives;
 mod outer;
 mod probes;
 mod registration;
+mod storage;
 
 pub use activations::ActivationTable;
 pub use bones::BoneTable;
@@ -36,6 +37,7 @@ pub use objectives::{ObjectiveTable, OutlierTable};
 pub use outer::write_outer;
 pub use probes::ProbeTable;
 pub use registration::{Placement, write_registration};
+pub use storage::storage;
 
 use super::frame::Frame;
 use super::run_folder::failed;

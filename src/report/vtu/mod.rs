@@ -6,6 +6,7 @@ pub mod grid;
 pub mod linear;
 pub mod markers;
 pub mod muscles;
+pub mod residuals;
 mod sample;
 pub mod xml;
 
