@@ -26,7 +26,7 @@ const FIRST_STEP: f64 = 0.5;
 const DAMPING: f64 = 0.1;
 /// What Newton's method does where nothing else is said.
 const LIMITS: Limits = Limits { iterations: 30, damping: DAMPING, test: Test::Monotone, otherwise: None };
-/// Residual, in relation to the element forces, of the states on the way to the equilibrium that is asked for: each is no more than
+/// Residual, in relation to the element forces, of the states on the way with contact to the equilibrium that is asked for: each is no more than
 /// the guess for the next.
 const ON_THE_WAY: f64 = 1e-3;
 /// Corrections with the tangent at hand before a new one is made.
@@ -232,6 +232,27 @@ impl<'m> Solver<'m> {
     /// # Errors
     /// [`Failure`] with the last equilibrium that was found on the path.
     pub fn equilibrium(&mut self, from: &State, to: &Drive) -> std::result::Result<Equilibrium, Box<Failure>> {
+        // where points of contact open and close, the last digits of a state on the way are dear
+        if self.balance.model.contacts().next().is_some() {
+            let found = self.follow(from, to, self.settings.tolerance.max(ON_THE_WAY));
+            if let Ok(found) = found
+                && found.negative_modes.unwrap_or(0) == 0
+            {
+                return Ok(found);
+            }
+            // a loose state is no witness of a loss of balance or of a path that ends
+        }
+        self.follow(from, to, self.settings.tolerance)
+    }
+
+    /// The same with states on the way that are balanced to `on_the_way`. Where they are looser than the end, no body is let go.
+    fn follow(
+        &mut self,
+        from: &State,
+        to: &Drive,
+        on_the_way: f64,
+    ) -> std::result::Result<Equilibrium, Box<Failure>> {
+        let loose = on_the_way > self.settings.tolerance;
         let start = Drive { controls: from.controls.clone(), load: from.load };
         let (warp, limits) = self.walk(&start, to);
         let mut stepper = Stepper::new(limits);
@@ -243,8 +264,7 @@ impl<'m> Solver<'m> {
         let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
-            let tolerance = self.settings.tolerance;
-            self.balance.tolerance = if place < 1.0 { tolerance.max(ON_THE_WAY) } else { tolerance };
+            self.balance.tolerance = if place < 1.0 { on_the_way } else { self.settings.tolerance };
             let guess = match &before {
                 Some((earlier, state)) => {
                     let ratio = (place - stepper.reached()) / (stepper.reached() - earlier);
@@ -256,7 +276,7 @@ impl<'m> Solver<'m> {
             let outcome = match self.attempt(guess, &last, limits) {
                 Ok(outcome) => outcome,
                 Err(error) => {
-                    let (reached, last_good) = (stepper.reached(), self.balanced(last.clone()));
+                    let (reached, last_good) = (stepper.reached(), last.clone());
                     return Err(Box::new(Failure { error, last_good, reached, failed: last, history }));
                 }
             };
@@ -269,6 +289,7 @@ impl<'m> Solver<'m> {
                 None => {
                     let found = self.balance.negative_modes().unwrap_or(0);
                     if found > modes
+                        && !loose
                         && let Some(released) = self.release(&snaps, &outcome.state, &last)
                     {
                         stepper.resumed(place);
@@ -292,6 +313,7 @@ impl<'m> Solver<'m> {
                     self.balance.set_target(between(&start, to, warp.place(beyond)));
                     // where even longer steps were not allowed, a shorter one may lead on
                     if stepper.length() < BEYOND_A_LIMIT
+                        && !loose
                         && let Some(released) = self.release(&snaps, &last, &last)
                     {
                         stepper.resumed(beyond);
@@ -302,24 +324,18 @@ impl<'m> Solver<'m> {
                     }
                     history.push(step(place, StepKind::Failed, outcome.last, outcome.iterations));
                     let reached = stepper.reached();
-                    let last_good = self.balanced(last);
-                    return Err(Box::new(Failure { error, last_good, reached, failed: outcome.state, history }));
+                    return Err(Box::new(Failure {
+                        error,
+                        last_good: last,
+                        reached,
+                        failed: outcome.state,
+                        history,
+                    }));
                 }
             }
         }
         self.balance.set_target(to.clone());
         self.close_gaps(last, history, snaps)
-    }
-
-    /// A state on the way, balanced as the end of a path is.
-    fn balanced(&mut self, state: State) -> State {
-        self.balance.tolerance = self.settings.tolerance;
-        self.balance.set_target(Drive { controls: state.controls.clone(), load: state.load });
-        let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
-        match self.solve(state.clone(), limits) {
-            Ok(outcome) if outcome.stop.is_none() => outcome.state,
-            _ => state,
-        }
     }
 
     /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.

@@ -77,7 +77,6 @@ impl Solver<'_> {
         if !self.settings.release || before.len() >= MOST_SNAPS {
             return None;
         }
-        self.balance.tolerance = self.settings.tolerance;
         let released = self.descend(start, last);
         self.balance.drag = None;
         // a tangent that cannot be factorised ends the attempt, not the run: the failure that led here is told
