@@ -253,6 +253,48 @@ fn a_frame_that_is_not_neutral_is_told_with_one_that_is() {
 }
 
 #[test]
+fn offsets_of_markers_are_taken_out_as_far_as_the_neutral_frame_tells_them() {
+    let places = markers(2.0);
+    let mut random = Random::new(11);
+    let offsets: Vec<[f64; 3]> = places.iter().map(|_| random.triple().map(|d| 3.0 * d - 1.5)).collect();
+    let shown = |by: f64| -> Vec<(String, [f64; 3])> {
+        let beside = |((name, p), o): (&(String, [f64; 3]), &[f64; 3])| {
+            (name.clone(), std::array::from_fn(|i| p[i] + o[i] + if i == 1 { by } else { 0.0 }))
+        };
+        places.iter().zip(&offsets).map(beside).collect()
+    };
+    // three markers that the neutral frame does not show cannot be told their offsets
+    let film = || {
+        let mut film = recording(&[shown(0.0), shown(0.5)]);
+        film.frames[0].positions_mm[..3].fill(None);
+        film
+    };
+    for (sd, prior, part) in [(0.3, 0.4, 0.64), (0.3, 3.0, 9.0 / 9.09)] {
+        let fit = format!("units = \"mm\"\nneutral = 0\nsd_mm = {sd}\noffset_sd_mm = {prior}\n");
+        let scene = Scene::parse(&problem(&places, &fit), "face.toml", Path::new("."), &[]).unwrap();
+        let mesh: Mesh = host(&scene.mesh).unwrap();
+        let placed = place(&scene, scene.fit.as_ref().unwrap(), &mesh, &film()).unwrap();
+        let (registration, _, found) = registered(&places, film(), &fit).unwrap();
+        let mut squares = 0.0;
+        for (k, marker) in placed.iter().enumerate() {
+            let (part, left) = if k < 3 { (0.0, prior * prior) } else { (part, part * sd * sd) };
+            assert!((marker.sd.unwrap() - f64::sqrt(sd * sd + left)).abs() < 1e-12);
+            let at = found.frames[1].positions_mm[marker.column].unwrap();
+            let x = mesh.position(marker.point);
+            for i in 0..3 {
+                let moved = if i == 1 { 0.5 } else { 0.0 };
+                let whole = places[k].1[i] + offsets[k][i] - x[i];
+                assert!((at[i] - x[i] - moved - (1.0 - part) * whole).abs() < 1e-9, "{} {i}", marker.name);
+                squares += if k < 3 { 0.0 } else { (part * whole).powi(2) };
+            }
+        }
+        let rms = (squares / (placed.len() - 3) as f64).sqrt();
+        assert!((registration.offset_rms_mm.unwrap() - rms).abs() < 1e-9);
+        assert!(registration.to_string().contains("offsets of markers"), "{registration}");
+    }
+}
+
+#[test]
 fn a_recording_that_stands_elsewhere_is_brought_home_only_when_asked() {
     let rest = markers(1.5);
     let shown = moved(&noisy(&rest, 10), &elsewhere());

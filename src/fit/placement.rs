@@ -17,10 +17,26 @@ pub struct Marker {
     pub point: MaterialPoint,
     /// How far the position in the problem was from the surface, mm.
     pub distance: f64,
-    /// Standard deviation of its measured coordinates, mm; `None` where the problem gives none.
+    /// Standard deviation of its measured coordinates, mm, with what the neutral frame leaves open of its offset; `None` where
+    /// the problem gives none.
     pub sd: Option<f64>,
+    /// What part of its distance in the neutral frame is taken for an offset.
+    pub offset_part: f64,
     /// Its column in the recording.
     pub column: usize,
+}
+
+impl Marker {
+    /// An offset of the standard deviation s, of which a neutral frame with the noise sd tells all but s sd / sqrt(s^2 + sd^2):
+    ///   o = s^2 / (s^2 + sd^2) (z - x),  sd'^2 = sd^2 + s^2 sd^2 / (s^2 + sd^2), or sd^2 + s^2 where that frame does not show it.
+    /// The rest of it is one error for all frames; each frame counts it as its own.
+    fn with_offset(&mut self, s: f64, seen: bool) {
+        let noise = self.sd.map_or(0.0, |sd| sd * sd);
+        let part = if seen { s * s / (s * s + noise) } else { 0.0 };
+        let left = if seen { part * noise } else { s * s };
+        self.sd = self.sd.map(|sd| (sd * sd + left).sqrt());
+        self.offset_part = part;
+    }
 }
 
 /// Places the markers of a scene on the surface of the host and finds them in the recording.
@@ -48,7 +64,15 @@ pub fn place(scene: &Scene, fit: &FitSpec, mesh: &Mesh, recording: &Recording) -
         } else if let Some(column) = column {
             let sd = spec.sd_mm.or(fit.sd_mm);
             let name = spec.name.clone();
-            markers.push(Marker { name, point: foot.point, distance: foot.distance, sd, column });
+            let (point, distance) = (foot.point, foot.distance);
+            markers.push(Marker { name, point, distance, sd, offset_part: 0.0, column });
+        }
+    }
+    if let Some(prior) = fit.registration.offset_sd_mm.filter(|_| mistakes.is_empty()) {
+        let neutral = neutral_frame(fit, &markers, recording)?;
+        for marker in &mut markers {
+            let seen = recording.frames.get(neutral).is_some_and(|n| n.positions_mm[marker.column].is_some());
+            marker.with_offset(prior, seen);
         }
     }
     if mistakes.is_empty() { Ok(markers) } else { Err(Error::all(mistakes)) }

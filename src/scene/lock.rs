@@ -448,7 +448,16 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         max_marker_distance_mm,
         frames: FramesSpec { first, last, step },
         registration:
-            RegistrationSpec { register, neutral, axes, head, head_place: _, register_place: _, neutral_place: _ },
+            RegistrationSpec {
+                register,
+                neutral,
+                offset_sd_mm,
+                axes,
+                head,
+                head_place: _,
+                register_place: _,
+                neutral_place: _,
+            },
         tolerance,
         max_iterations,
         finite_difference_step,
@@ -489,6 +498,9 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         format!("frames = {{ first = {first}, {last}step = {step} }}"),
         format!("register = \"{}\"", register.word()),
         neutral.map_or("neutral = \"first\"".into(), |frame| format!("neutral = {frame}")),
+    ]);
+    lines.extend(offset_sd_mm.map(|sd| format!("offset_sd_mm = {}", number(sd))));
+    lines.extend([
         format!("axes = [{}]", axes.map(|axis| text(axis.word())).join(", ")),
         format!("tolerance = {}", number(*tolerance)),
         format!("max_iterations = {max_iterations}"),

@@ -1,6 +1,6 @@
 //! How a recording is brought to the model: `[fit] register`, `neutral`, `axes` and `head`.
 
-use super::cursor::{Item, Reader, Table};
+use super::cursor::{Item, POSITIVE, Reader, Table};
 use super::spec::{AxisSpec, HeadSpec, RegisterSpec, RegistrationSpec};
 use super::tree::Value;
 use super::units::Units;
@@ -24,6 +24,7 @@ pub(super) fn registration(table: &mut Table, units: Option<Option<Units>>) -> O
         _ => item.whole(0, MOST_FRAMES).map(Some),
     });
     let neutral_place = table.place_of("neutral");
+    let offset_sd_mm = table.optional("offset_sd_mm", |item| item.number(POSITIVE));
     let [x, y, z, ..] = AxisSpec::ALL;
     let axes = table.or("axes", [x, y, z], axes);
     let head_place = table.place_of("head");
@@ -36,6 +37,7 @@ pub(super) fn registration(table: &mut Table, units: Option<Option<Units>>) -> O
     Some(RegistrationSpec {
         register: register?,
         neutral: neutral?,
+        offset_sd_mm: offset_sd_mm?,
         axes: axes?,
         head: head?,
         head_place,

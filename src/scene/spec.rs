@@ -833,6 +833,9 @@ pub struct RegistrationSpec {
     pub register: RegisterSpec,
     /// The frame in which nothing has moved yet; by default the first of those that show the most markers.
     pub neutral: Option<usize>,
+    /// How far markers sit from where the model has them on the skin, standard deviation per coordinate, mm: the neutral frame
+    /// then tells each of these offsets. `None`: not at all.
+    pub offset_sd_mm: Option<f64>,
     /// The axes of the recording that are x, y and z of the model, before that motion.
     pub axes: [AxisSpec; 3],
     /// From what the motion of the head is known.

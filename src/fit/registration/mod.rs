@@ -44,6 +44,9 @@ pub struct Registration {
     pub markers: Vec<Registered>,
     /// Root mean square distance of those that are not off, mm.
     pub rms_mm: f64,
+    /// Root mean square of the offsets of markers from their places that were taken out of every frame, mm; `None` where none
+    /// were asked for.
+    pub offset_rms_mm: Option<f64>,
     /// How the head moved, where that was taken out.
     pub head: Option<HeadMotion>,
     /// Centre of the markers in the neutral frame on the model, mm.
@@ -124,7 +127,25 @@ pub fn register(
             bones.variance_mm2 *= registration.motion.scale * registration.motion.scale;
         }
     }
+    if fit.registration.offset_sd_mm.is_some() {
+        registration.offset_rms_mm = Some(take_offsets(mesh, markers, recording, frame));
+    }
     Ok((registration, std::mem::take(warnings)))
+}
+
+/// Brings markers that sit beside their places on the model there, in every frame, as far as the neutral frame tells how far off
+/// they are. The root mean square of these offsets, mm.
+fn take_offsets(mesh: &Mesh, markers: &[Marker], recording: &mut Recording, neutral: usize) -> f64 {
+    let mut lengths = Vec::with_capacity(markers.len());
+    for marker in markers {
+        let Some(seen) = recording.frames[neutral].positions_mm[marker.column] else { continue };
+        let offset = subtract(seen, mesh.position(marker.point)).map(|d| marker.offset_part * d);
+        lengths.push(norm(offset));
+        for position in recording.frames.iter_mut().filter_map(|frame| frame.positions_mm[marker.column].as_mut()) {
+            *position = subtract(*position, offset);
+        }
+    }
+    rms(&lengths)
 }
 
 /// Takes the axes of a recording as they are called.
@@ -185,6 +206,7 @@ fn registration(
         scale: scale(&agreeing),
         markers,
         rms_mm: placed.rms,
+        offset_rms_mm: None,
         head: None,
         centre: head::middle(&neutral.pairs.iter().map(|p| Some(placed.motion.place(p.0))).collect::<Vec<_>>()),
     };
@@ -232,7 +254,8 @@ pub fn neutral_frame(fit: &FitSpec, markers: &[Marker], recording: &Recording) -
 impl std::fmt::Display for Registration {
     /// A paragraph of a page.
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Registration { register, motion, moved_mm, neutral, scale, markers, rms_mm, head, centre } = self;
+        let Registration { register, motion, moved_mm, neutral, scale, markers, rms_mm, offset_rms_mm, head, centre } =
+            self;
         if let Some(head) = head {
             out.write_str(&head.describe(*centre))?;
         }
@@ -254,6 +277,12 @@ impl std::fmt::Display for Registration {
         )?;
         if !off.is_empty() {
             writeln!(out, "  {} did not count, being farther off: {}", off.len(), off.join(", "))?;
+        }
+        if let Some(offset) = offset_rms_mm {
+            writeln!(
+                out,
+                "  of that {offset:.3} mm (rms) are taken for offsets of markers from the skin, in every frame"
+            )?;
         }
         match scale {
             Some(Scale { value, interval: [lower, upper] }) => {
