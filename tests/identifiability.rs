@@ -176,6 +176,7 @@ fn a_frame_with_all_controls_on_bounds_is_told_of() {
         name: "M".into(),
         point: MaterialPoint { element: 0, xi: [0.0; 3] },
         distance: 0.0,
+        offset_part: 0.0,
         sd: Some(0.5),
         column: 0,
     };
