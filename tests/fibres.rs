@@ -3,6 +3,8 @@
 mod common;
 #[path = "fibres/tricubic.rs"]
 mod tricubic;
+#[path = "fibres/zinc.rs"]
+mod zinc;
 
 use common::Random;
 use risorius::fibres::{Axis, FibreFit, fit};

@@ -201,3 +201,57 @@ fn local_directions_must_continue_each_other() {
     assert!(error.to_string().contains("elements 0 and 1"), "{error}");
     assert!(risorius::fibres::fit(&problem(AnglesSpec::A), &turned, &names, &data).is_ok());
 }
+
+/// A muscle with a tricubic field contracts: the same answer where the field is also trilinear, another where it bends.
+#[test]
+fn a_muscle_with_a_tricubic_field_contracts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mut mesh = block(&Trilinear, [0.0; 3], [24.0, 6.0, 2.0], [2, 1, 1]);
+    mesh.parameters.iter_mut().for_each(|x| (0..3).for_each(|i| x[i] += [3.0, 2.0, 6.0][i]));
+    let space = Space::new(FieldSpec::Tricubic, &mesh, &Place::whole("fibres.toml")).unwrap();
+    let nodes: Vec<[f64; 2]> = (0..mesh.nodes).map(|node| [0.1 * node as f64, 0.05]).collect();
+    let mut straight = space.lifted(&nodes);
+    // d1, d2 and d3 of what the numbers of the nodes make, 3 x 2 x 2
+    for value in &space.values {
+        [(1, 0.1), (2, 0.3), (4, 0.6)].iter().for_each(|(d, slope)| straight[value + d][0] = *slope);
+    }
+    let mut bent = straight.clone();
+    // dA/dxi1 at the nodes in the middle
+    space.values.iter().zip(&mesh.parameters).filter(|(_, x)| x[0] == 15.0).for_each(|(value, _)| {
+        bent[value + 1][0] += 0.8;
+    });
+    let tricubic = |angles: &Vec<[f64; 2]>| {
+        let local = |e: usize| {
+            let local = space.local(e, angles);
+            std::array::from_fn(|a| [local[a][0], local[a][1], 0.0])
+        };
+        let locals = (0..mesh.elements()).map(local).collect();
+        FibreAngles { tricubic: Some(locals), ..trilinear(&nodes) }
+    };
+    fn trilinear(nodes: &[[f64; 2]]) -> FibreAngles {
+        FibreAngles::at_nodes(nodes.iter().map(|[a, b]| [*a, *b, 0.0]).collect())
+    }
+    let tip = |name: &str, angles: &FibreAngles| -> Vec<f64> {
+        let text = write_mesh(&mesh, &[("coordinates", &mesh.parameters)]) + &write_angles(&mesh, "fibres", angles);
+        std::fs::write(path("muscle.exf"), text).unwrap();
+        let problem = "[task]\nkind = \"forward\"\n[mesh]\n\
+            block = { origin_mm = [0, 0, 0], size_mm = [30, 10, 10], elements = [3, 1, 1] }\n\
+            [tissue]\nmooney-rivlin = { c1_kpa = 0.5, c2_kpa = 0.2 }\n[[muscle]]\nname = \"slab\"\nexf = \"muscle.exf\"\n\
+            angles_field = \"fibres\"\n\
+            blemker = { sigma_max_kpa = 300, lambda_star = 1.4, lambda_ofl = 1.0, p1 = 0.005, p2 = 6.6 }\n\
+            [[support]]\nclamp = { face = \"xi1=0\" }\n[controls]\nslab = 0.02\n\
+            [[probe]]\nname = \"tip\"\nposition_mm = [30, 10, 10]\n";
+        std::fs::write(path("problem.toml"), problem).unwrap();
+        let mut command = assert_cmd::Command::cargo_bin("risorius").unwrap();
+        command.current_dir(folder.path()).args(["run", "problem.toml", "-q", "--out", name]).assert().success();
+        let table = std::fs::read_to_string(path(name).join("tables/probes.csv")).unwrap();
+        table.lines().last().unwrap().split(',').filter_map(|cell| cell.parse().ok()).collect()
+    };
+    let [plain, lifted, curved] =
+        [tip("trilinear", &trilinear(&nodes)), tip("tricubic", &tricubic(&straight)), tip("bent", &tricubic(&bent))];
+    println!("tip: {plain:.4?} trilinear, {lifted:.4?} the same field as tricubic, {curved:.4?} bent");
+    let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(plain.len() > 5 && apart(&plain, &lifted) < 1e-9, "{plain:?} {lifted:?}");
+    assert!(apart(&plain, &curved) > 0.01, "{plain:?} {curved:?}");
+}

@@ -2,7 +2,8 @@
 
 Zinc evaluates the fields `coordinates` and `deformed` of every element at random points. They must agree with the Bezier
 cells that the same run wrote for ParaView, evaluated here with Bernstein's cubics; the quadrature points of the muscles
-with those in the VTU file. `python check_exf.py A.exf B.exf` compares the first field of coordinates of two EX files of the
+with those in the VTU file. Of a run that fitted fibres, the axes that Zinc makes of the angles in `fibres.exf` must be those
+of `view/fibres.vtu`. `python check_exf.py A.exf B.exf` compares the first field of coordinates of two EX files of the
 same mesh instead, element by element in their order. Exit 0 if all is well.
 """
 
@@ -118,6 +119,31 @@ def check_muscles(path, region):
     return worst / np.abs(points).max()
 
 
+def check_fibres(run):
+    """The largest difference between the places and the axes of Zinc and those of the VTU file."""
+    _keep, region = read(run / "fibres.exf")
+    points, arrays = vtu(run / "view" / "fibres.vtu")
+    module = region.getFieldmodule()
+    coordinates, angles = module.findFieldByName("coordinates"), module.findFieldByName("fibres")
+    axes = module.createFieldFibreAxes(angles, coordinates)
+    found = elements(region)
+    # every element is drawn as parts x parts x parts hexahedra
+    parts = round((len(points) / 8 / len(found)) ** (1 / 3))
+    assert len(points) == 8 * parts**3 * len(found), "whole elements"
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = [(i, j, k) for k in range(parts) for j in range(parts) for i in range(parts)]
+    places = [tuple((c + e) / parts for c, e in zip(cell, corner)) for cell in cells for corner in corners]
+    cache, size = module.createFieldcache(), np.abs(points).max()
+    worst = [0.0, 0.0]
+    for index in range(len(points)):
+        cache.setMeshLocation(found[index // len(places)], list(places[index % len(places)]))
+        at, along = coordinates.evaluateReal(cache, 3)[1], axes.evaluateReal(cache, 9)[1]
+        expected = np.concatenate([arrays["fibre"][index], arrays["sheet"][index]])
+        worst[0] = max(worst[0], np.abs(np.array(at) - points[index]).max() / size)
+        worst[1] = max(worst[1], np.abs(np.array(along[:6]) - expected).max())
+    return worst
+
+
 def first_coordinates(region):
     iterator = region.getFieldmodule().createFielditerator()
     field = iterator.next()
@@ -150,6 +176,8 @@ def main():
     paths = parser.parse_args().paths
     if len(paths) == 2:
         errors = [("difference", compare(*paths))]
+    elif (paths[0] / "fibres.exf").exists():
+        errors = list(zip(["places", "axes of fibres and sheets"], check_fibres(paths[0])))
     else:
         files = sorted((paths[0] / "view").glob("result_*.exf"))
         assert files, "no EX file"
@@ -158,7 +186,7 @@ def main():
             _keep, region = read(path)
             errors += [(f"{path.name} host", check_host(path, region)), (f"{path.name} muscles", check_muscles(path, region))]
     for name, error in errors:
-        print(f"{name}: {error:.1e} of the size of the body")
+        print(f"{name}: {error:.1e} of the size")
         assert math.isfinite(error) and error < RELATIVE
 
 
