@@ -80,6 +80,13 @@ impl Search<'_> {
         (0..self.sought).map(one).collect()
     }
 
+    /// The most by which one parameter of a step changes an angle anywhere, radians.
+    pub fn longest(&self, step: &[Vec<f64>]) -> f64 {
+        let reached =
+            step.iter().flat_map(|step| step.iter().zip(&self.space.reach).map(|(x, reach)| x.abs() * reach));
+        reached.fold(0.0, f64::max)
+    }
+
     /// Moves angles along `part` of a step.
     pub fn moved(&self, angles: &Angles, step: &[Vec<f64>], part: f64) -> Angles {
         let mut moved = angles.clone();
@@ -159,8 +166,11 @@ impl<'s, 'a> Solver<Objective<'s, 'a>, AngleState> for Damped {
         let angles = state.take_param().ok_or_else(|| ArgminError::msg("the state of the search is incomplete"))?;
         let before = state.get_cost();
         let sums = &self.sums;
-        let step = problem.problem("step_count", |p| Ok(p.search.step(&angles, sums, p.lambda)?))?;
-        let longest = step.iter().flatten().fold(0.0, |longest: f64, x| longest.max(x.abs()));
+        let (step, longest) = problem.problem("step_count", |p| {
+            let step = p.search.step(&angles, sums, p.lambda)?;
+            let longest = p.search.longest(&step);
+            Ok((step, longest))
+        })?;
         // a step of more than a radian leaves the chart in which it was made
         let mut part = if longest > 1.0 { 1.0 / longest } else { 1.0 };
         for halvings in 0..HALVINGS {

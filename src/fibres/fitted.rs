@@ -14,7 +14,7 @@ use crate::scene::{FibreProblem, FieldSpec, SmoothnessSpec};
 use std::collections::BTreeMap;
 
 /// The smoothness of the first search where it is chosen afterwards.
-const FIRST: f64 = 1e-6;
+const FIRST: f64 = 1e-3;
 /// The smoothness of the tensors of the start, and of the second start where data are sparse.
 const STARTS: [f64; 2] = [1e-3, 1e-1];
 /// The searches before the first where data are sparse.

@@ -10,6 +10,7 @@ use super::space::Angles;
 use crate::error::Result;
 use faer::Mat;
 use faer::linalg::solvers::Solve;
+use rayon::prelude::*;
 
 /// Powers of ten of the smoothness that are tried.
 const POWERS: std::ops::RangeInclusive<i32> = -12..=6;
@@ -106,7 +107,7 @@ pub fn choose(search: &Search, angles: &Angles, sums: &Sums, near: Option<f64>) 
         Some(near) => [-1.0, 0.0, 1.0].iter().map(|step| near.log10() + step).collect(),
         None => POWERS.map(f64::from).collect(),
     };
-    let mut tried = powers.iter().map(|power| score(*power)).collect::<Result<Vec<_>>>()?;
+    let mut tried = powers.par_iter().map(|power| score(*power)).collect::<Result<Vec<_>>>()?;
     let best = (0..tried.len()).min_by(|a, b| tried[*a].score.total_cmp(&tried[*b].score)).unwrap_or_default();
     let (mut low, mut high) = (powers[best.saturating_sub(1)], powers[(best + 1).min(powers.len() - 1)]);
     const GOLDEN: f64 = 0.618_033_988_749_895;

@@ -34,6 +34,9 @@ pub struct Space {
     pub values: Vec<usize>,
     /// The number of parameters.
     pub parameters: usize,
+    /// The most by which a unit of each parameter changes an angle: (4/27)^r of a derivative by r directions, 4/27 being the
+    /// maximum of Hermite's xi (1 - xi)^2.
+    pub reach: Vec<f64>,
 }
 
 impl Space {
@@ -46,11 +49,12 @@ impl Space {
     /// # Errors
     /// [`Error::UnlikeDirections`] for a tricubic field on a trilinear mesh whose local directions change from element to element.
     pub fn new(field: FieldSpec, mesh: &Mesh, place: &Place) -> Result<Space> {
-        let (map, values, parameters) = match field {
+        let of_derivative = |derivative: u8| (4.0_f64 / 27.0).powi(derivative.count_ones() as i32);
+        let (map, values, reach) = match field {
             FieldSpec::Trilinear => {
                 let term = |node: &usize| vec![Term { global: *node as u32, scale: 1.0 }];
                 let map = ElementMap::new(8, mesh.corners.iter().flatten().map(term));
-                (map, (0..mesh.nodes).collect(), mesh.nodes)
+                (map, (0..mesh.nodes).collect(), vec![1.0; mesh.nodes])
             }
             FieldSpec::Tricubic if mesh.element.parameters_per_node() == 8 => {
                 let mut values = vec![0; mesh.nodes];
@@ -59,14 +63,16 @@ impl Space {
                 {
                     values[*node] = p;
                 }
-                (mesh.map.clone(), values, mesh.parameters.len())
+                let reach = mesh.parameter_derivative.iter().map(|derivative| of_derivative(*derivative as u8));
+                (mesh.map.clone(), values, reach.collect())
             }
             FieldSpec::Tricubic => {
-                (on_edges(mesh, place)?, (0..mesh.nodes).map(|node| 8 * node).collect(), 8 * mesh.nodes)
+                let reach = (0..mesh.nodes).flat_map(|_| (0..8).map(of_derivative));
+                (on_edges(mesh, place)?, (0..mesh.nodes).map(|node| 8 * node).collect(), reach.collect())
             }
         };
         let turns = vec![[0; 8]; mesh.elements()];
-        Ok(Space { field, map, nodes: mesh.corners.clone(), turns, values, parameters })
+        Ok(Space { field, map, nodes: mesh.corners.clone(), turns, values, parameters: reach.len(), reach })
     }
 
     /// The same with half turns at corners.

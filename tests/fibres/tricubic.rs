@@ -1,7 +1,7 @@
 //! Tricubic fields of angles: found again, C1, better than trilinear ones on the same mesh, kept by EX files.
 
 use super::common::{self, Random};
-use super::{DEGREE, apart, directions, errors, fitted, most, problem, ring, sampled};
+use super::{DEGREE, apart, directions, disturbed, errors, fitted, most, problem, ring, sampled};
 use risorius::Place;
 use risorius::fibres::space::Space;
 use risorius::fibres::{Axis, FibreFit};
@@ -200,6 +200,20 @@ fn local_directions_must_continue_each_other() {
     assert_eq!(error.code(), "G026");
     assert!(error.to_string().contains("elements 0 and 1"), "{error}");
     assert!(risorius::fibres::fit(&problem(AnglesSpec::A), &turned, &names, &data).is_ok());
+}
+
+/// Derivatives that few data determine do not hold the search up: steps are long where they turn an angle, not where a number is large.
+#[test]
+fn a_tricubic_search_takes_few_steps() {
+    let mesh = block(&Trilinear, [0.0; 3], [50.0, 40.0, 15.0], [5, 4, 3]);
+    let nodes = (0..mesh.nodes).map(|node| [0.1 * (node % 6) as f64 + 0.3 * (node / 30) as f64, 0.05, 0.0]);
+    let truth = FibreAngles::at_nodes(nodes.collect());
+    let mut random = Random::new(40);
+    let mut data = sampled(&mesh, &truth, 60, &mut random);
+    data.iter_mut().for_each(|axis| axis.fibre = disturbed(axis.fibre, 12.0 * DEGREE, &mut random));
+    let fit = fitted(&tricubic(AnglesSpec::AB), &mesh, &data);
+    println!("960 numbers per angle, 60 noisy axes in each of 60 elements: {} steps", fit.steps);
+    assert!(fit.converged && fit.steps <= 25, "{} steps", fit.steps);
 }
 
 /// A muscle with a tricubic field contracts: the same answer where the field is also trilinear, another where it bends.
