@@ -1,6 +1,7 @@
 //! The face that is built in: its mesh, its landmarks, its muscles, a run, and the template.
 
 use assert_cmd::Command;
+use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::fibre::Blemker;
 use risorius::math::tensor::{Vector, add_scaled, determinant, dot, norm, normalised, subtract};
@@ -11,6 +12,7 @@ use risorius::mesh::fibre_angles::FibreAngles;
 use risorius::mesh::location::Locator;
 use risorius::mesh::{MaterialPoint, Mesh, position_and_jacobian};
 use risorius::model::build::build;
+use risorius::report::frame::contact_states;
 use risorius::scene::{GeometrySpec, Scene, built_in_face};
 use risorius::term::contact::surface::{Arch, RigidSurface};
 use risorius::term::muscle::Muscle;
@@ -569,6 +571,33 @@ fn each_muscle_alone_draws_its_insertion_to_its_origin() {
         assert!(ring || dot(u, pull) > 0.9 * norm(u), "{}: {u:?}, pulled along {pull:?}", muscle.name);
         assert!(norm(u) > 0.2, "{}: {u:?}", muscle.name);
         assert_eq!(found.negative_modes, Some(0), "{}", muscle.name);
+    }
+}
+
+/// The smile at two thirds, by the implicit function theorem and by central differences of whole equilibria.
+#[test]
+fn sensitivities_agree_where_the_face_slides_and_the_lips_touch() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/smile/problem.toml");
+    let built = build(&Scene::read(&path, &[]).unwrap()).unwrap();
+    let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+    let mut solver = Solver::new(&built.model, settings).unwrap();
+    let drive = Drive { controls: vec![0.06, 0.05, 0.04, 0.04], load: 1.0 };
+    let at = solver.equilibrium(&built.model.rest(), &drive);
+    let at = at.unwrap_or_else(|failure| panic!("{}", failure.error));
+    for contact in contact_states(&built.model, &at.state) {
+        println!("{}: {:.0} mm2, {:.1} kPa at most", contact.name, contact.area, contact.max_pressure);
+        assert!(contact.max_pressure > 0.1, "{} is not active", contact.name);
+    }
+    let unknowns = [0, 3];
+    let tangent = sensitivities(Sensitivity::Tangent, &mut solver, &at, &unknowns).unwrap();
+    // kinks of contact and of slack fibres lie between neighbours that are too far apart
+    let how = Sensitivity::FiniteDifference { step: 1e-5 };
+    let difference = sensitivities(how, &mut solver, &at, &unknowns).unwrap();
+    for (control, (a, b)) in unknowns.iter().zip(tangent.iter().zip(&difference)) {
+        let scale = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!("{}: {:.1e} apart", built.model.controls()[*control].name, worst / scale);
+        assert!(worst < 1e-5 * scale, "control {control}: {:.1e}", worst / scale);
     }
 }
 

@@ -195,6 +195,27 @@ fn frames_that_do_not_show_the_head_are_lost_and_counted() {
 }
 
 #[test]
+fn frames_whose_bone_markers_leave_the_head_open_are_told() {
+    // a tenth of a millimetre of one of them; in frame 8 three are left, close together
+    let noise = |frame: usize| [2.1, 4.7, 3.3].map(|rate| 0.2 * (rate * frame as f64).sin());
+    let hidden = |frame: usize, label: &str| frame == 8 && ["H0", "H2"].contains(&label);
+    let topic = markers(&Motion::REST, noise, hidden);
+    let (_, warnings, _) = fitted(&[topic], BONES, &[1]).unwrap();
+    assert_eq!(warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["K018"]);
+    let message = &warnings[0].message;
+    let frames = twin().truth.len();
+    for told in [format!("in 1 of {frames} frames: in frame 8"), "`H1`, `H3`, `H4`, leave `B".to_owned()] {
+        assert!(message.contains(&told), "{message}");
+    }
+    // five of them standard deviations of a bone marker (H C H^T of the three places)
+    let after = |mark: &str| -> f64 {
+        message.split(mark).nth(1).unwrap().split_whitespace().next().unwrap().parse().unwrap()
+    };
+    let (open, noise) = (after("open by "), after("a bone marker has "));
+    assert!((open / noise - 4.96).abs() < 0.6 && noise > 0.02, "{message}");
+}
+
+#[test]
 fn a_topic_of_poses_takes_the_head_out() {
     let own = Motion { scale: 1.0, turn: rotation(normalised([0.0, 1.0, 3.0]), 2.0), shift: [-30.0, 5.0, 70.0] };
     let pose = |frame: usize| {

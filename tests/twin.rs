@@ -13,6 +13,7 @@ use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::fit::{Estimate, Fit};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::markers::{Frame, ReadOptions, Recording, WriteOptions, read, write_json};
+use risorius::model::State;
 use risorius::model::build::build;
 use risorius::scene::{Scene, Units};
 use std::fmt::Write;
@@ -85,6 +86,36 @@ fn truth_within_1e_6_in_every_frame() {
             assert!((found - truth).abs() < 1e-6, "frame {}: {found} instead of {truth}", estimate.frame);
         }
         assert!(estimate.rms_mm < 1e-4, "frame {}: rms {} mm", estimate.frame, estimate.rms_mm);
+    }
+}
+
+/// A forward solve at the fitted activations: the bits of the fit from its own state, and the same place from rest.
+#[test]
+fn a_replay_of_the_fitted_activations_is_what_was_reported() {
+    let twin = twin();
+    let mut frames = frames(&twin.positions_mm);
+    // measurements that no activations explain
+    for (k, position) in frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()).enumerate() {
+        (0..3).for_each(|i| position[i] += 0.3 * ((7 * k + 3 * i) as f64).sin());
+    }
+    let scene = Scene::parse(&problem(""), "twin.toml", Path::new("."), &[]).expect("a scene");
+    let built = build(&scene).expect("a model");
+    let bits =
+        |state: &State| -> Vec<u64> { state.u.iter().flatten().chain(&state.p).map(|x| x.to_bits()).collect() };
+    for estimate in fit(&twin.labels, &frames, &[4, 12, 28], "register = \"none\"\n") {
+        let fitted = &estimate.equilibrium.state;
+        let drive = Drive { controls: fitted.controls.clone(), load: fitted.load };
+        let mut solver = Solver::new(&built.model, Settings::default()).expect("memory");
+        let replay = solver.equilibrium_near(fitted, fitted, &drive).expect("an equilibrium").state;
+        assert_eq!(bits(&replay), bits(fitted), "frame {}", estimate.frame);
+        // so the residuals are those of the table
+        let from_rest = solver.equilibrium(&built.model.rest(), &drive).expect("an equilibrium").state;
+        assert!(estimate.rms_mm > 0.1);
+        let pairs = from_rest.u.iter().flatten().zip(fitted.u.iter().flatten());
+        let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!("frame {}: {apart:.1e} mm from the state that is reached from rest", estimate.frame);
+        // both are balanced to the tolerance of the solver, not further
+        assert!(apart < 1e-4, "frame {}: {apart} mm", estimate.frame);
     }
 }
 

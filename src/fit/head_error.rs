@@ -12,12 +12,18 @@ use super::estimate::Optimum;
 use super::frame::Measured;
 use super::head::middle;
 use super::objective::loss::Loss;
+use super::placement::Marker;
+use super::recording::chosen_frames;
+use crate::error::Warning;
 use crate::markers::{BoneNoise, Recording};
 use crate::math::tensor::subtract;
+use crate::scene::{FitSpec, HeadSpec};
 use nalgebra::{DMatrix, Matrix6};
 
 /// A smaller variance of bone markers is rounding, mm2.
 const ROUNDING: f64 = 1e-12;
+/// A marker that the head leaves open by more than so many standard deviations of a bone marker is told of.
+const OPEN: f64 = 3.0;
 
 /// The error of the head in a frame, about the centre of the bone markers: turn, rad, and shift, mm.
 pub(super) struct HeadError {
@@ -48,6 +54,12 @@ impl HeadError {
         Some(HeadError { own, common, centre })
     }
 
+    /// The standard deviation that the head of this frame gives a place, along the direction where it is greatest, mm.
+    pub fn at(&self, place: [f64; 3]) -> f64 {
+        let h = by_head(place, self.centre);
+        (h * self.own * h.transpose()).symmetric_eigenvalues().max().sqrt()
+    }
+
     /// G of a frame: a row for every control that is sought.
     pub fn across(&self, loss: Loss, optimum: Seen<'_>, measured: &[Measured]) -> DMatrix<f64> {
         let Seen { residuals, jacobian } = optimum;
@@ -60,6 +72,42 @@ impl HeadError {
         }
         loss.model(residuals, &both).1.view((0, n), (n, 6)).into_owned()
     }
+}
+
+/// K018: chosen frames whose bone markers leave a marker open, being few, in a heap or far from it.
+pub(super) fn open(fit: &FitSpec, recording: &Recording, neutral: usize, markers: &[Marker]) -> Option<Warning> {
+    let (HeadSpec::BoneMarkers(labels), Some(bones)) = (&fit.registration.head, &recording.bones) else {
+        return None;
+    };
+    let place = |m: &Marker| Some((m.name.clone(), recording.frames[neutral].positions_mm[m.column]?));
+    let places: Vec<(String, [f64; 3])> = markers.iter().filter_map(place).collect();
+    let noise = bones.variance_mm2.sqrt();
+    // the marker that is worst in a frame, where it is bad
+    let worst = |frame: usize| {
+        let error = HeadError::of(recording, frame)?;
+        let sds = places.iter().map(|(name, place)| (error.at(*place), name));
+        let (sd, name) = sds.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (sd > OPEN * noise).then_some((sd, name, frame))
+    };
+    let chosen = chosen_frames(fit, recording).ok()?;
+    let frames: Vec<_> = chosen.iter().filter_map(|frame| worst(*frame)).collect();
+    let (sd, name, frame) = *frames.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let counted: Vec<String> = bones.shown[frame].iter().map(|bone| format!("`{}`", labels[*bone])).collect();
+    Some(Warning {
+        code: "K018",
+        message: format!(
+            "the bone markers say poorly where the head is in {} of {} frames: in frame {frame} those that count, {}, leave `{name}` \
+             open by {sd:.2} mm (standard deviation; a bone marker has {noise:.2} mm)",
+            frames.len(),
+            chosen.len(),
+            counted.join(", "),
+        ),
+        place: Some(fit.registration.head_place.clone()),
+        help: Some(
+            "name more bone markers, all around the head; until then the intervals of these frames allow for it"
+                .into(),
+        ),
+    })
 }
 
 /// Residuals of a frame with their derivative.

@@ -14,6 +14,7 @@ pub use mirror::{nearest, pairings};
 pub use scale::{Scale, scale};
 
 use super::head::{self, HeadMotion};
+use super::head_error;
 use super::placement::{Marker, units_against};
 use crate::error::{Cause, Error, Misregistration, Result, Warning};
 use crate::markers::{Poses, Recording};
@@ -127,6 +128,7 @@ pub fn register(
             bones.variance_mm2 *= registration.motion.scale * registration.motion.scale;
         }
     }
+    warnings.extend(head_error::open(fit, recording, frame, markers));
     if fit.registration.offset_sd_mm.is_some() {
         registration.offset_rms_mm = Some(take_offsets(mesh, markers, recording, frame));
     }
