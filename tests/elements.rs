@@ -415,3 +415,33 @@ fn fibre_angles_are_interpolated() {
     let expected = axes(&mesh.jacobian(at), middle)[0];
     assert_eq!(angles.direction(&mesh, 0, &mesh.local(0), [0.5; 3]), expected);
 }
+
+/// The volume of an affine image is the determinant times that of the block; of a curved body, what a finer rule finds.
+#[test]
+fn volumes_are_exact() {
+    let mut random = Random::new(21);
+    for element in ELEMENTS {
+        let mesh = block(element, [1.0, -2.0, 0.5], [6.0, 4.0, 3.0], [3, 2, 1]);
+        assert!((mesh.volume(&mesh.parameters) - 72.0).abs() < 1e-11);
+        let f = random.deformation();
+        let apply = |x: &[f64; 3]| std::array::from_fn(|i| (0..3).map(|j| f[i][j] * x[j]).sum());
+        let moved: Vec<[f64; 3]> = mesh.parameters.iter().map(apply).collect();
+        let expected = 72.0 * determinant(&f);
+        assert!((mesh.volume(&moved) - expected).abs() < 1e-11 * expected.abs());
+    }
+    let curved = curved_block(&TricubicHermite, [2, 2, 1], 0.05, 9);
+    let rule = GaussRule::new(8);
+    let along = || rule.points.iter().zip(&rule.weights);
+    let mut finer = 0.0;
+    for element in 0..curved.elements() {
+        for (x, a) in along() {
+            for (y, b) in along() {
+                for (z, c) in along() {
+                    finer += a * b * c * determinant(&curved.jacobian(MaterialPoint { element, xi: [*x, *y, *z] }));
+                }
+            }
+        }
+    }
+    let volume = curved.volume(&curved.parameters);
+    assert!((volume - finer).abs() < 1e-12 * finer, "{volume} {finer}");
+}

@@ -107,6 +107,7 @@ pub(super) fn forward(
             external_work: model.external_work(&found.state),
             reactions: &model.supports().rotation_reactions(model.mesh(), &found.evaluation.force, &x),
             det_f: found.evaluation.det_f,
+            volume_change: model.mesh().volume(&x) / model.mesh().volume(&model.mesh().parameters) - 1.0,
             mesh_errors: &estimates.errors,
             iterations: work.iterations,
             seconds: run.start.elapsed().as_secs_f64(),

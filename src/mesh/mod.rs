@@ -15,10 +15,12 @@ pub mod location;
 pub mod map;
 pub mod surface;
 
-use crate::math::tensor::{Matrix, Vector};
+use crate::math::quadrature::GaussRule;
+use crate::math::tensor::{Matrix, Vector, determinant};
 use element::Element;
 use face::Face;
 use map::ElementMap;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A mesh of one kind of hexahedron; immutable once built.
@@ -90,6 +92,31 @@ impl Mesh {
         let mut local = [[0.0; 64]; 3];
         self.map.gather(element, global, &mut local);
         local
+    }
+
+    /// The volume of the body with the global parameters `x`, mm3: the sum over elements of the integral of det(dx/dxi), which is
+    /// of degree 8 along each direction and integrated exactly.
+    pub fn volume(&self, x: &[Vector]) -> f64 {
+        let rule = GaussRule::new(5);
+        let along = || rule.points.iter().zip(&rule.weights);
+        let mut points = Vec::with_capacity(125);
+        for (z, c) in along() {
+            for (y, b) in along() {
+                points.extend(along().map(|(x, a)| (self.element.gradients([*x, *y, *z]), a * b * c)));
+            }
+        }
+        let of_element = |element: usize| -> f64 {
+            let local = self.local_of(element, x);
+            let at = |(gradients, weight): &([[f64; 3]; 64], f64)| {
+                let jacobian: Matrix = std::array::from_fn(|i| {
+                    std::array::from_fn(|d| local[i].iter().zip(gradients).map(|(x, g)| x * g[d]).sum())
+                });
+                weight * determinant(&jacobian)
+            };
+            points.iter().map(at).sum()
+        };
+        let parts: Vec<f64> = (0..self.elements()).into_par_iter().map(of_element).collect();
+        parts.iter().sum()
     }
 
     /// The field with global parameters `global` at a material point.

@@ -30,6 +30,8 @@ pub struct ForwardSummary<'a> {
     pub reactions: &'a [(f64, f64)],
     /// Range of det F.
     pub det_f: WorstPoint,
+    /// Change of the volume, as a part of it.
+    pub volume_change: f64,
     /// What was estimated of the mesh's error.
     pub mesh_errors: &'a MeshErrors,
     /// Newton iterations of all frames.
@@ -83,7 +85,14 @@ impl fmt::Display for ForwardSummary<'_> {
         for (number, (torque, axial)) in self.reactions.iter().enumerate() {
             writeln!(out, "  rotation {number}: torque {torque:.4} mN mm, axial force {axial:.4} mN")?;
         }
-        writeln!(out, "  det F {:.4} to {:.4} (smallest in element {})", det_f.min, det_f.max, det_f.element)?;
+        writeln!(
+            out,
+            "  det F {:.4} to {:.4} (smallest in element {}); the volume changes by {:+.3} %",
+            det_f.min,
+            det_f.max,
+            det_f.element,
+            100.0 * self.volume_change
+        )?;
         write!(out, "{}", self.mesh_errors)?;
         writeln!(out, "\nnext: tables in {0}/tables, shapes in {0}/view/result.pvd (ParaView)", self.folder)
     }
