@@ -23,7 +23,8 @@ out = pathlib.Path(sys.argv[2] if len(sys.argv) > 2 else ".")
 out.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
-# Tables. Units stand in the names of columns, an empty cell is a lost value.
+# Tables. Units stand in the names of columns, an empty cell is a lost value. The same with types and in less space: `risorius export RUN
+# --to parquet`, then `pandas.read_parquet(run / "export/tables/activations.parquet")`.
 
 # %%
 activations = pandas.read_csv(run / "tables/activations.csv").set_index("time_s")
