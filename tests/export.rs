@@ -31,7 +31,7 @@ fn run() -> &'static Path {
         let (exit, _, stderr) =
             risorius(&["run", BEAM, "--set", "fit.frames={first=0,last=30,step=10}", "--out", &run]);
         assert_eq!(exit, 0, "{stderr}");
-        let (exit, stdout, stderr) = risorius(&["export", &run, "--to", "glb,mcap,sto,exf,obj,ply,parquet"]);
+        let (exit, stdout, stderr) = risorius(&["export", &run, "--to", "glb,mcap,sto,exf,obj,ply,parquet,vtu"]);
         assert!(exit == 0 && stderr.is_empty() && stdout.contains("result.glb ("), "{stdout}{stderr}");
         folder
     });
@@ -236,6 +236,11 @@ fn tables_and_meshes_have_one_row_per_frame_and_point() {
     for shape in &run.shapes {
         let name = format!("result_{:04}.exf", shape.frame.index);
         assert_eq!(fs::read(export(&name)).unwrap(), fs::read(run.folder.join("view").join(&name)).unwrap());
+    }
+    for name in
+        ["result.pvd", "result.vtu.series", "linear/result.pvd", "linear/result_0020.vtu", "residuals_0030.vtu"]
+    {
+        assert_eq!(fs::read(export(name)).unwrap(), fs::read(run.folder.join("view").join(name)).unwrap());
     }
 }
 

@@ -95,7 +95,11 @@ fn table(file: File) -> Found {
         });
         let range = range.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)]);
         let kind = column.physical_type().to_string();
-        Part::new(column.name(), [("type", json!(kind)), ("empty", json!(empty)), ("range", json!(range))])
+        let range = match kind.as_str() {
+            "INT64" => json!(range.map(|range| range.map(|end| end as i64))),
+            _ => json!(range),
+        };
+        Part::new(column.name(), [("type", json!(kind)), ("empty", json!(empty)), ("range", range)])
     };
     let parts: Vec<Part> = schema.columns().iter().enumerate().map(column).collect();
     Ok((format!("table, {rows} rows, {} columns", parts.len()), parts))

@@ -9,6 +9,7 @@ pub mod obj;
 pub mod parquet;
 pub mod ply;
 pub mod sto;
+pub mod vtu;
 
 use super::playback::{Playback, Shape};
 use super::run_folder::{failed, write_atomically};
@@ -32,11 +33,13 @@ pub enum Format {
     Ply,
     /// The tables of a run of any task, with types.
     Parquet,
+    /// The shapes for ParaView, exact and linear.
+    Vtu,
 }
 
 impl Format {
     /// All of them, with their words and what they are for.
-    pub const ALL: [(Format, &'static str, &'static str); 7] = [
+    pub const ALL: [(Format, &'static str, &'static str); 8] = [
         (Format::Glb, "glb", "Blender and game engines: skin, muscles, deformation modes, activation curves"),
         (Format::Mcap, "mcap", "Foxglove, Lichtblick, Rerun: everything over time, with a layout"),
         (Format::Sto, "sto", "OpenSim: activations"),
@@ -44,6 +47,7 @@ impl Format {
         (Format::Obj, "obj", "anything that reads meshes: skin and muscles of one frame"),
         (Format::Ply, "ply", "the skin of one frame with its displacement"),
         (Format::Parquet, "parquet", "pandas, R, DuckDB: every table with its types, of a study or of fibres too"),
+        (Format::Vtu, "vtu", "ParaView: the exact shape and the linear one, as they are in the run's view"),
     ];
 }
 
@@ -100,6 +104,7 @@ fn show(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path,
                 let shape = chosen(run, frame)?;
                 done.write(folder.join(format!("frame_{:04}.ply", shape.frame.index)), ply::file(run, shape))?;
             }
+            Format::Vtu => vtu::copy(run, folder, done)?,
             Format::Parquet => {}
         }
     }
