@@ -93,9 +93,9 @@ fn labels_that_could_be_matched_otherwise_are_told() {
 #[test]
 fn a_gap_that_multipliers_do_not_close_is_not_accepted() {
     let folder = tempfile::tempdir().expect("a folder");
-    let text = forward(&problem(&MUSCLES[..1], &MARKERS, ""))
+    let text = forward(&problem(&[("top", [3.0, 3.5, 6.5])], &MARKERS, ""))
         + "[[sliding]]\nface = \"xi3=0\"\nsurface = { reference = true }\n\
-           law = { augmented = { kpa_per_mm = 1e-4, gap_mm = 1e-6 } }\n[controls]\n\"top.L\" = 0.02\n";
+           law = { augmented = { kpa_per_mm = 1e-4, gap_mm = 1e-6 } }\n[controls]\ntop = 0.005\n";
     fs::write(folder.path().join("soft.toml"), text).expect("written");
     let (exit, stderr) = risorius(folder.path(), &["run", "soft.toml", "--out", "run"]);
     assert!(exit == 4 && stderr.contains("error[S006]"), "{stderr}");
@@ -121,7 +121,7 @@ fn a_bridged_frame_is_told() {
     let folder = tempfile::tempdir().expect("a folder");
     let extra = "sd_mm = 0.3\nsmoothness = { sd_per_root_s = 0.03 }\nclip = \"smoother\"\nmax_iterations = 6\n";
     let text = problem(&MUSCLES[..2], &MARKERS, extra);
-    let truth: Vec<Vec<f64>> = (0..5).map(|k| vec![0.004 * f64::from(k), 0.01]).collect();
+    let truth: Vec<Vec<f64>> = (0..5).map(|k| vec![0.004 * f64::from(k), 0.002 * f64::from(k)]).collect();
     let clip = folder.path().join("clip.mcap");
     record(&clip, &text, &truth, 0.1, 4);
     let mut seen = common::twin::recording(&clip);
@@ -133,17 +133,15 @@ fn a_bridged_frame_is_told() {
     assert!(exit == 4 && stderr.contains("warn[F012]: frame 3 failed and is bridged"), "{stderr}");
 }
 
-/// One step is not enough for a stiffness that is a third off.
+/// One step is not enough for a muscle whose fibres run 25 degrees off.
 #[test]
 fn what_all_frames_share_is_not_taken_from_an_unfinished_search() {
     let folder = tempfile::tempdir().expect("a folder");
-    let outer = "sd_mm = 0.1\n[fit.outer]\nmax_iterations = 1\n[[fit.outer.unknown]]\nstiffness = \"tissue\"\n";
-    let load = "[[load]]\ntraction = { face = \"xi1=1\", kpa = [0, 0, -0.004] }\n[[support]]";
-    let text = |extra: &str| problem(&[MUSCLES[0], MUSCLES[3]], &MARKERS, extra).replace("[[support]]", load);
-    let stiffer = text("").replace("c1_kpa = 0.5, c2_kpa = 0.2", "c1_kpa = 0.7, c2_kpa = 0.28");
-    let poses = [vec![0.012, 0.004], vec![0.004, 0.02], vec![0.02, 0.015]];
-    record(&folder.path().join("clip.mcap"), &stiffer, &poses, 0.0, 1);
-    fs::write(folder.path().join("twin.toml"), text(outer)).expect("written");
+    let outer = "sd_mm = 0.1\n[fit.outer]\nframes = [1, 2]\nmax_iterations = 1\n\
+                 [[fit.outer.unknown]]\nfibre_angle = \"top.L\"\nmode = \"constant\"\n";
+    let turned = problem(&MUSCLES[..1], &MARKERS, "").replace("[0, 0, 0]\nblemker", "[25, 0, 0]\nblemker");
+    record(&folder.path().join("clip.mcap"), &turned, &[vec![0.0], vec![0.01], vec![0.02]], 0.0, 1);
+    fs::write(folder.path().join("twin.toml"), problem(&MUSCLES[..1], &MARKERS, outer)).expect("written");
     let (exit, stderr) = risorius(folder.path(), &["run", "twin.toml", "--out", "run"]);
     assert!(exit == 4 && stderr.contains("error[F014]"), "{stderr}");
 }
