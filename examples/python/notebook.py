@@ -1,9 +1,9 @@
 # %% [markdown]
 # A run of risorius read with pandas, pyvista and mcap: nothing here is specific to it but the names of files and columns.
 #
-#     risorius run && risorius export runs/beam-0001 --to mcap
+#     risorius run && risorius export runs/face-0001 --to mcap
 #     pip install pandas pyvista mcap matplotlib
-#     python examples/python/notebook.py runs/beam-0001 OUT
+#     python examples/python/notebook.py runs/face-0001 OUT
 #
 # The cells between `# %%` open as a notebook in VS Code, Spyder or with jupytext.
 

@@ -43,7 +43,7 @@ use crate::scene::Units;
 
 /// Finds out which muscles moved a face.
 ///
-/// Without a command it runs the problem that is built in: a beam with two muscles and a recording of its markers.
+/// Without a command it runs the problem that is built in: a face with thirty muscles and a recording of its markers.
 #[derive(Debug, Parser)]
 #[command(name = "risorius", version, about, max_term_width = 100)]
 struct Cli {

@@ -178,7 +178,7 @@ fn obj(text: &str) -> Found {
     let what = text.lines().next().and_then(|line| line.strip_prefix("# ")).unwrap_or("meshes").to_owned();
     match found.is_empty() {
         true => Err("it has no object".into()),
-        false => Ok((what, found.iter().map(|(name, [points, faces])| body(*name, *points, *faces)).collect())),
+        false => Ok((what, found.iter().map(|(name, [points, faces])| body(name, *points, *faces)).collect())),
     }
 }
 
