@@ -6,7 +6,7 @@ use common::twin::{MARKERS, MUSCLES, problem, record};
 use risorius::error::Result;
 use risorius::report::export::{Format, export};
 use risorius::report::html;
-use risorius::report::playback::{Contents, Playback};
+use risorius::report::playback::Contents;
 use risorius::report::state::{Checkpoints, Guard};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -26,7 +26,7 @@ fn run(folder: &Path) -> PathBuf {
 /// Everything that reads the folder of a run; what each said.
 fn all_readers(run: &Path, out: &Path) -> Vec<(&'static str, Result<()>)> {
     let formats = Format::ALL.map(|(format, ..)| format);
-    let export = || Playback::read(run).and_then(|playback| export(&playback, &formats, None, out)).map(drop);
+    let export = || export(run, &formats, None, out).map(drop);
     let resume = || {
         Guard::read(run)?.changes(run);
         Checkpoints::open(run)?.left().map(drop)

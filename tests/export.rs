@@ -1,6 +1,8 @@
 //! Does what is exported hold what the run found?
 
 use assert_cmd::Command;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
 use risorius::report::export::modes::modes;
 use risorius::report::playback::{Playback, Sheet};
 use serde_json::Value;
@@ -29,7 +31,7 @@ fn run() -> &'static Path {
         let (exit, _, stderr) =
             risorius(&["run", BEAM, "--set", "fit.frames={first=0,last=30,step=10}", "--out", &run]);
         assert_eq!(exit, 0, "{stderr}");
-        let (exit, stdout, stderr) = risorius(&["export", &run, "--to", "glb,mcap,sto,exf,obj,ply"]);
+        let (exit, stdout, stderr) = risorius(&["export", &run, "--to", "glb,mcap,sto,exf,obj,ply,parquet,vtu"]);
         assert!(exit == 0 && stderr.is_empty() && stdout.contains("result.glb ("), "{stdout}{stderr}");
         folder
     });
@@ -235,16 +237,175 @@ fn tables_and_meshes_have_one_row_per_frame_and_point() {
         let name = format!("result_{:04}.exf", shape.frame.index);
         assert_eq!(fs::read(export(&name)).unwrap(), fs::read(run.folder.join("view").join(&name)).unwrap());
     }
+    for name in
+        ["result.pvd", "result.vtu.series", "linear/result.pvd", "linear/result_0020.vtu", "residuals_0030.vtu"]
+    {
+        assert_eq!(fs::read(export(name)).unwrap(), fs::read(run.folder.join("view").join(name)).unwrap());
+    }
+}
+
+/// A cell of a CSV table as the field of a Parquet table that it must be.
+fn field(cell: &str, kind: &str) -> Field {
+    match kind {
+        _ if cell.is_empty() => Field::Null,
+        "INT64" => Field::Long(cell.parse().unwrap()),
+        "DOUBLE" => Field::Double(cell.parse().unwrap()),
+        _ => Field::Str(cell.to_owned()),
+    }
+}
+
+/// Compares `<name>.parquet` with its CSV table, cell by cell and to the last bit; returns the names and types of its columns.
+fn same_table(folder: &Path, exported: &Path, name: &str) -> Vec<(String, String)> {
+    let sheet = Sheet::find(&folder.join("tables"), name).unwrap().unwrap();
+    let path = exported.join(format!("tables/{name}.parquet"));
+    let file = SerializedFileReader::try_from(path.as_path()).unwrap();
+    let columns = file.metadata().file_metadata().schema_descr().columns().to_vec();
+    let kinds: Vec<(String, String)> =
+        columns.iter().map(|c| (c.name().to_owned(), c.physical_type().to_string())).collect();
+    assert!(kinds.iter().map(|(name, _)| name).eq(sheet.columns()), "{name}: {kinds:?}");
+    let rows: Vec<_> = file.get_row_iter(None).unwrap().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), sheet.len(), "{name}");
+    for (at, row) in rows.into_iter().enumerate() {
+        for (column, ((title, value), (_, kind))) in row.into_columns().into_iter().zip(&kinds).enumerate() {
+            assert_eq!(value, field(sheet.text(at, column), kind), "{name}, row {at}, {title}");
+        }
+    }
+    kinds
+}
+
+#[test]
+fn parquet_tables_hold_what_the_csv_tables_hold() {
+    let names: Vec<String> = fs::read_dir(run().join("tables"))
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().to_str()?.strip_suffix(".csv").map(str::to_owned))
+        .collect();
+    assert!(names.len() > 10, "{names:?}");
+    let mut found = BTreeMap::new();
+    for name in &names {
+        found.insert(name.as_str(), same_table(run(), &run().join("export"), name));
+    }
+    assert_eq!(fs::read_dir(export("tables")).unwrap().count(), names.len());
+    let kind = |table: &str, column: &str| {
+        found[table].iter().find(|(name, _)| name == column).map(|(_, kind)| kind.as_str()).unwrap()
+    };
+    // 0.0 is a number also where every value happens to be whole, and what is always empty is one too
+    for (table, column, expected) in [
+        ("activations", "frame", "INT64"),
+        ("activations", "time_s", "DOUBLE"),
+        ("activations", "top", "DOUBLE"),
+        ("markers", "name", "BYTE_ARRAY"),
+        ("markers", "measured_x_mm", "DOUBLE"),
+        ("convergence", "kind", "BYTE_ARRAY"),
+        ("identifiability", "prior_dominated", "INT64"),
+        ("identifiability", "bias", "DOUBLE"),
+    ] {
+        assert_eq!(kind(table, column), expected, "{table}, {column}");
+    }
+}
+
+/// Names that look like numbers stay names, commas and quotes stay in their cells, and a table may have no row.
+#[test]
+fn parquet_keeps_names_that_look_like_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let tables = folder.path().join("tables");
+    fs::create_dir(&tables).unwrap();
+    fs::copy(run().join("status.json"), folder.path().join("status.json")).unwrap();
+    let write = |name: &str, text: &str| fs::write(tables.join(name), text).unwrap();
+    write("markers.csv", "frame,time_s,name,x_mm\n0,0.0,7,1.0\n1,0.5,007,\n2,1.0,\"a, \"\"b\"\"\",-inf\n");
+    write("activations.csv", "frame,time_s,a\n0,0.0,0.25\n");
+    write("outliers.csv", "frame,time_s,marker,weight\n");
+    write("labels.csv", "label,count\n007,9007199254740993\n8,-1\n");
+    let (path, out) = (folder.path().display().to_string(), folder.path().join("out"));
+    let (exit, stdout, stderr) = risorius(&["export", &path, "--to", "parquet", "--out", &out.display().to_string()]);
+    assert!(exit == 0 && stdout.lines().count() == 4, "{stdout}{stderr}");
+    let kinds = |name: &str| -> Vec<String> {
+        same_table(folder.path(), &out, name).into_iter().map(|(_, kind)| kind).collect()
+    };
+    assert_eq!(kinds("markers"), ["INT64", "DOUBLE", "BYTE_ARRAY", "DOUBLE"]);
+    assert_eq!(kinds("activations"), ["INT64", "DOUBLE", "DOUBLE"]);
+    assert_eq!(kinds("outliers"), ["DOUBLE", "DOUBLE", "BYTE_ARRAY", "DOUBLE"]);
+    // 007 is a number, though no count
+    assert_eq!(kinds("labels"), ["DOUBLE", "INT64"]);
+    write("labels.csv", "label,count\n007\n");
+    let (exit, _, stderr) = risorius(&["export", &path, "--to", "parquet"]);
+    assert!(exit == 6 && stderr.contains("error[O005]") && stderr.contains("row 2 has 1 cells"), "{stderr}");
+}
+
+/// Tables are there for every task, shapes are not.
+#[test]
+fn tables_of_fibres_are_exported_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let fan = folder.path().join("fan");
+    let (path, problem) =
+        (fan.display().to_string(), concat!(env!("CARGO_MANIFEST_DIR"), "/problems/fibres/problem.toml"));
+    assert_eq!(risorius(&["run", problem, "-q", "--out", &path]).0, 0);
+    let (exit, stdout, stderr) = risorius(&["export", &path, "--to", "parquet"]);
+    assert!(exit == 0 && stdout.contains("fibre_angles.parquet"), "{stdout}{stderr}");
+    same_table(&fan, &fan.join("export"), "fibre_angles");
+    let (exit, _, stderr) = risorius(&["export", &path, "--to", "glb"]);
+    assert!(exit == 6 && stderr.contains("error[O003]"), "{stderr}");
+}
+
+#[test]
+fn inspect_tells_what_an_exported_file_holds() {
+    let run = Playback::read(run()).unwrap();
+    let frame = run.farthest().unwrap().frame.index;
+    let points = format!("points {}", run.skin.rest.len());
+    for (name, words) in [
+        ("result.glb", vec!["scene `beam`, modes within", &points, "activation bottom", "keys 4"]),
+        ("activations.sto", vec!["storage, 4 rows, 3 columns", "top", "range 0.0 to"]),
+        (&format!("frame_{frame:04}.obj"), vec!["beam, frame", &points, "bottom"]),
+        (&format!("frame_{frame:04}.ply"), vec!["beam, frame", "skin", &points]),
+        (
+            "tables/markers.parquet",
+            vec!["table, 48 rows, 13 columns", "distance_mm", "type DOUBLE", "type BYTE_ARRAY"],
+        ),
+        ("result.mcap", vec!["/risorius/skin"]),
+        ("result_0030.exf", vec!["deformed"]),
+    ] {
+        let path = export(name).display().to_string();
+        let (exit, page, stderr) = risorius(&["inspect", &path]);
+        assert_eq!(exit, 0, "{stderr}");
+        for words in words {
+            assert!(page.contains(words), "`{words}` is not in\n{page}");
+        }
+        let (_, page, _) = risorius(&["inspect", &path, "--json"]);
+        assert!(serde_json::from_str::<Value>(&page).is_ok(), "{page}");
+        // half of it says that it is not whole, or what is left
+        let half = tempfile::tempdir().unwrap();
+        let cut = half.path().join(Path::new(name).file_name().unwrap());
+        let bytes = fs::read(export(name)).unwrap();
+        fs::write(&cut, &bytes[..bytes.len() / 7]).unwrap();
+        let (exit, _, stderr) = risorius(&["inspect", &cut.display().to_string()]);
+        assert!(exit == 0 || ((exit == 6 || exit == 3) && stderr.starts_with("error[")), "{name}: {exit} {stderr}");
+    }
+    let table = export("tables/markers.parquet").display().to_string();
+    let (_, page, _) = risorius(&["inspect", &table, "--json"]);
+    let columns = serde_json::from_str::<Value>(&page).unwrap();
+    let lost =
+        run.markers.iter().flat_map(|marker| &marker.samples).filter(|sample| sample.measured.is_none()).count();
+    assert_eq!(
+        (&columns["parts"][12]["name"], &columns["parts"][12]["holds"]["empty"]),
+        (&"distance_mm".into(), &lost.into())
+    );
 }
 
 #[test]
 fn the_same_run_gives_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let again = folder.path().display().to_string();
-    let (exit, ..) =
-        risorius(&["export", &run().display().to_string(), "--to", "glb,mcap", "--out", &again, "--threads", "1"]);
+    let (exit, ..) = risorius(&[
+        "export",
+        &run().display().to_string(),
+        "--to",
+        "glb,mcap,parquet",
+        "--out",
+        &again,
+        "--threads",
+        "1",
+    ]);
     assert_eq!(exit, 0);
-    for name in ["result.glb", "result.mcap"] {
+    for name in ["result.glb", "result.mcap", "tables/markers.parquet"] {
         assert!(fs::read(folder.path().join(name)).unwrap() == fs::read(export(name)).unwrap(), "{name}");
     }
 }
@@ -274,7 +435,7 @@ fn what_cannot_be_exported_says_why() {
     let (exit, _, stderr) = risorius(&["export", &whole, "--to", "obj", "--frame", "7"]);
     assert!(exit == 6 && stderr.contains("error[O006]") && stderr.contains("0, 10, 20, 30"), "{stderr}");
     let (exit, _, stderr) = risorius(&["export", &whole, "--to", "fbx"]);
-    assert!(exit == 2 && stderr.contains("glb, mcap, sto"), "{stderr}");
+    assert!(exit == 2 && stderr.contains("glb, mcap, sto") && stderr.contains("parquet"), "{stderr}");
     let out = folder.path().join("blind").display().to_string();
     let blind = ["run", BEAM, "--set", "fit.frames={first=0,last=0}", "--set", "output.view=false", "--out", &out];
     assert_eq!(risorius(&blind).0, 0);

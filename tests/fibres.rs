@@ -585,7 +585,7 @@ fn files_of_vtk_are_read() {
         expected.map(|e| e.0).to_vec(),
         vec![Field::vectors("v", expected.map(|e| e.1).to_vec())],
     );
-    check("i.vtu", &risorius::report::vtu::xml::file(&grid).unwrap(), None);
+    check("i.vtu", &risorius::report::vtu::xml::file(&grid, &mut Default::default()).unwrap(), None);
 
     // a tensor that is longest along (1, 1, 0), and one without direction
     let tensors = "POINT_DATA 2\nTENSORS d float\n2 1 0\n1 2 0\n0 0 1\n\n1 0 0\n0 1 0\n0 0 1\n";

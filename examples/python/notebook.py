@@ -1,9 +1,9 @@
 # %% [markdown]
 # A run of risorius read with pandas, pyvista and mcap: nothing here is specific to it but the names of files and columns.
 #
-#     risorius run && risorius export runs/beam-0001 --to mcap
+#     risorius run && risorius export runs/face-0001 --to mcap
 #     pip install pandas pyvista mcap matplotlib
-#     python examples/python/notebook.py runs/beam-0001 OUT
+#     python examples/python/notebook.py runs/face-0001 OUT
 #
 # The cells between `# %%` open as a notebook in VS Code, Spyder or with jupytext.
 
@@ -23,7 +23,8 @@ out = pathlib.Path(sys.argv[2] if len(sys.argv) > 2 else ".")
 out.mkdir(parents=True, exist_ok=True)
 
 # %% [markdown]
-# Tables. Units stand in the names of columns, an empty cell is a lost value.
+# Tables. Units stand in the names of columns, an empty cell is a lost value. The same with types and in less space: `risorius export RUN
+# --to parquet`, then `pandas.read_parquet(run / "export/tables/activations.parquet")`.
 
 # %%
 activations = pandas.read_csv(run / "tables/activations.csv").set_index("time_s")

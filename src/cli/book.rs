@@ -26,7 +26,7 @@ pub(super) struct Book<'a> {
     /// Names of markers, and of controls with their units.
     pub names: Vec<String>,
     pub labels: Vec<String>,
-    record: Record<'a>,
+    pub record: Record<'a>,
     telling: Telling,
     pub estimates: Estimates<'a>,
     pub tally: Tally,

@@ -4,7 +4,6 @@ use super::terminal::print;
 use super::{Ending, Flags};
 use crate::error::Result;
 use crate::report::export::{Format, export as write};
-use crate::report::playback::Playback;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use std::path::Path;
@@ -31,9 +30,8 @@ impl ValueEnum for Format {
 
 /// Writes into `--out`, or else into the folder `export` of the run.
 pub(super) fn export(run: &Path, formats: &[Format], frame: Option<usize>, flags: &Flags) -> Result<Ending> {
-    let playback = Playback::read(run)?;
     let folder = flags.out.clone().unwrap_or_else(|| run.join("export"));
-    let done = write(&playback, formats, frame, &folder)?;
+    let done = write(run, formats, frame, &folder)?;
     flags.warn(&done.warnings);
     let mut page = String::new();
     for file in &done.files {

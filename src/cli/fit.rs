@@ -22,6 +22,7 @@ use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome}
 use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
+use std::time::Instant;
 
 /// Fits every frame that is not done, keeps and writes it, prints the page.
 pub(super) fn fit(
@@ -111,9 +112,11 @@ pub(super) fn fit(
                 SavedOutcome::Failed(failed)
             }
         };
+        let start = Instant::now();
         checkpoints.save(at, &outcome, &Carried { fit: fit.memory(), halved: book.estimates.tangent_states() })?;
-        meter.frame(&said, &numbers);
         run.write_running(&book.tally)?;
+        book.record.wrote_since(start);
+        meter.frame(&said, &numbers);
     }
     meter.finish();
     if smoothed && !book.tally.interrupted {

@@ -15,6 +15,7 @@ use crate::model::build::Built;
 use crate::report::summary::ForwardSummary;
 use crate::report::{FailedFrame, Frame, Probe, Record, bone_states, muscle_states, probe_states};
 use crate::scene::Scene;
+use std::time::Instant;
 
 /// Solves every frame, writes it, prints the page.
 pub(super) fn forward(
@@ -82,7 +83,9 @@ pub(super) fn forward(
                 state = failure.last_good;
             }
         }
+        let start = Instant::now();
         run.write_running(&tally)?;
+        record.wrote_since(start);
     }
     let mut estimates = Estimates::new(prepared, settings(scene), of_probes(&probes))?;
     if let Some((frame, found)) = &last {

@@ -1,9 +1,11 @@
-//! `risorius inspect FILE`: what is in a marker recording, in an EX file, in a file of VTK, or in the folder of a run.
+//! `risorius inspect FILE`: what is in a marker recording, in an EX file, in a file of VTK, in what was exported, or in the
+//! folder of a run.
 
 use super::Ending;
 use super::terminal::print;
 use crate::error::{Error, Result};
 use crate::mesh::exf;
+use crate::report::export::inspect::inspect as exported;
 use crate::report::playback::Contents;
 use crate::{fibres, markers};
 use serde::Serialize;
@@ -18,7 +20,10 @@ pub(super) fn inspect(file: &Path, json: bool) -> Result<Ending> {
     match extension.as_deref() {
         Some("exf" | "ex" | "exnode" | "exelem") => show(&exf::inspect(file)?, json),
         Some("vtk" | "vtu" | "vtp") => show(&fibres::inspect::inspect(file)?, json),
-        _ => show(&markers::inspect(file)?, json),
+        _ => match exported(file)? {
+            Some(exhibit) => show(&exhibit, json),
+            None => show(&markers::inspect(file)?, json),
+        },
     }
 }
 

@@ -43,7 +43,7 @@ use crate::scene::Units;
 
 /// Finds out which muscles moved a face.
 ///
-/// Without a command it runs the problem that is built in: a beam with two muscles and a recording of its markers.
+/// Without a command it runs the problem that is built in: a face with thirty muscles and a recording of its markers.
 #[derive(Debug, Parser)]
 #[command(name = "risorius", version, about, max_term_width = 100)]
 struct Cli {
@@ -95,9 +95,9 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// What is in a recording, an EX file, a file of VTK or the folder of a run
+    /// What is in a recording, an EX file, a file of VTK, an exported file or the folder of a run
     Inspect {
-        /// An MCAP, C3D, TRC, CSV, EXF, VTK, VTU or VTP file, or a folder
+        /// An MCAP, C3D, TRC, CSV, EXF, VTK, VTU, VTP, GLB, STO, OBJ, PLY or Parquet file, or a folder
         file: PathBuf,
         /// As JSON
         #[arg(long)]

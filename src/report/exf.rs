@@ -2,27 +2,49 @@
 
 use super::run_folder::write_atomically;
 use crate::error::Result;
-use crate::math::tensor::{norm, normalised};
-use crate::mesh::exf::{Points, write_mesh, write_points};
+use crate::math::tensor::{Vector, norm, normalised};
+use crate::mesh::exf::{Points, write_elements, write_mesh_with, write_points};
 use crate::model::{Model, State};
 use std::path::Path;
+
+/// Fields of the host.
+const FIELDS: [&str; 2] = ["coordinates", "deformed"];
+
+/// What is the same in the files of all states of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Common {
+    /// The elements of the host, as text.
+    elements: String,
+    /// Reference positions of the points of all muscles, mm.
+    points: Vec<Vector>,
+}
+
+impl Common {
+    /// Of a model.
+    pub fn new(model: &Model) -> Common {
+        let mesh = model.mesh();
+        let points = model.muscles().flat_map(|(_, muscle)| muscle.points()).map(|point| mesh.position(point.host));
+        Common { elements: write_elements(mesh, &FIELDS), points: points.collect() }
+    }
+}
 
 /// The text for a state. The region `/` holds the host with the fields `coordinates` (reference) and `deformed`, in mm;
 /// elements and nodes are numbered from 1 in the order of the model. The region `/muscles` holds the quadrature points of
 /// all muscles as data points: `coordinates`, `deformed`, unit `fibre`, `stretch`, `activation` and `muscle`, its number
 /// from 1.
-pub fn text(model: &Model, state: &State) -> String {
+pub fn text(model: &Model, state: &State, common: &Common) -> String {
     let mesh = model.mesh();
     let x = model.current(state);
-    let mut text = write_mesh(mesh, &[("coordinates", &mesh.parameters), ("deformed", &x)]);
-    let (mut reference, mut position, mut fibre) = (Vec::new(), Vec::new(), Vec::new());
+    let [coordinates, deformed] = FIELDS;
+    let fields = [(coordinates, mesh.parameters.as_slice()), (deformed, x.as_slice())];
+    let mut text = write_mesh_with(mesh, &fields, &common.elements);
+    let (mut position, mut fibre) = (Vec::new(), Vec::new());
     let (mut stretch, mut activation, mut number) = (Vec::new(), Vec::new(), Vec::new());
     for (index, (_, muscle)) in model.muscles().enumerate() {
         for in_element in muscle.points().chunk_by(|a, b| a.host.element == b.host.element) {
             let local = mesh.local_of(in_element[0].host.element, &x);
             for point in in_element {
                 let v = point.deformed_fibre(&local);
-                reference.push(mesh.position(point.host));
                 position.push(mesh.interpolate(point.host, &x));
                 fibre.push(normalised(v));
                 stretch.push(norm(v));
@@ -31,10 +53,10 @@ pub fn text(model: &Model, state: &State) -> String {
             }
         }
     }
-    if !reference.is_empty() {
+    if !position.is_empty() {
         let fields = [
-            Points::Vectors("coordinates", &reference),
-            Points::Vectors("deformed", &position),
+            Points::Vectors(coordinates, &common.points),
+            Points::Vectors(deformed, &position),
             Points::Vectors("fibre", &fibre),
             Points::Scalars("stretch", &stretch),
             Points::Scalars("activation", &activation),
@@ -49,6 +71,6 @@ pub fn text(model: &Model, state: &State) -> String {
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
-pub fn write(path: &Path, model: &Model, state: &State) -> Result<()> {
-    write_atomically(path, text(model, state).as_bytes())
+pub fn write(path: &Path, model: &Model, state: &State, common: &Common) -> Result<()> {
+    write_atomically(path, text(model, state, common).as_bytes())
 }

@@ -199,6 +199,11 @@ impl<'a> Record<'a> {
         Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }
 
+    /// Counts writing that others began at `start`: checkpoints and the status.
+    pub fn wrote_since(&mut self, start: Instant) {
+        self.seconds += start.elapsed().as_secs_f64();
+    }
+
     /// Time spent in writing so far, s.
     pub fn seconds(&self) -> f64 {
         self.seconds

@@ -4,6 +4,7 @@ use super::exf;
 use super::frame::{Frame, MarkerPair};
 use super::pvd::Collection;
 use super::run_folder::RunFolder;
+use super::vtu::xml::Before;
 use super::vtu::{Grid, bezier, contact, linear, markers, muscles, residuals};
 use crate::error::Result;
 use crate::model::{Model, State};
@@ -14,6 +15,8 @@ use std::path::PathBuf;
 #[derive(Debug, Clone)]
 pub struct View {
     folder: PathBuf,
+    /// What the EX files of all frames have in common, from the first on.
+    common: Option<exf::Common>,
     shape: Series,
     linear: Series,
     muscles: Series,
@@ -28,6 +31,7 @@ struct Series {
     folder: PathBuf,
     name: &'static str,
     collection: Collection,
+    before: Before,
 }
 
 impl View {
@@ -41,6 +45,7 @@ impl View {
             contact: Series::new(folder.clone(), "contact"),
             markers: Series::new(folder.clone(), "markers"),
             residuals: Series::new(folder.clone(), "residuals"),
+            common: None,
             folder,
         }
     }
@@ -58,9 +63,12 @@ impl View {
         markers: &[MarkerPair<'_>],
         contacts: &[Vec<ContactPoint>],
     ) -> Result<()> {
-        let View { folder, shape, linear, muscles, contact, markers: shown, residuals: apart } = self;
+        let View { folder, common, shape, linear, muscles, contact, markers: shown, residuals: apart } = self;
         let time_s = frame.time_s;
-        let exf = || exf::write(&folder.join(format!("result_{:04}.exf", frame.index)), model, state);
+        let exf = || {
+            let common = common.get_or_insert_with(|| exf::Common::new(model));
+            exf::write(&folder.join(format!("result_{:04}.exf", frame.index)), model, state, common)
+        };
         let shape = || shape.add(frame, &bezier::shape(model, state, time_s));
         let linear = || linear.add(frame, &linear::shape(model, state, time_s));
         let points = || {
@@ -94,12 +102,13 @@ impl View {
 
 impl Series {
     fn new(folder: PathBuf, name: &'static str) -> Series {
-        Series { collection: Collection::new(folder.join(format!("{name}.pvd"))), folder, name }
+        let collection = Collection::new(folder.join(format!("{name}.pvd")));
+        Series { collection, folder, name, before: Before::default() }
     }
 
     fn add(&mut self, frame: Frame, grid: &Grid) -> Result<()> {
         let file = format!("{}_{:04}.vtu", self.name, frame.index);
-        grid.write(&self.folder.join(&file))?;
+        grid.write_after(&self.folder.join(&file), &mut self.before)?;
         self.collection.add(frame.time_s, &file)
     }
 }

@@ -2,7 +2,7 @@
 
     python tests/python/check_exports.py RUN
 
-Needs numpy, mcap, jsonschema, trimesh, pygltflib, cmlibs.zinc; if `gltf_validator.js` is named by GLTF_VALIDATOR (a folder in which
+Needs numpy, mcap, jsonschema, trimesh, pygltflib, cmlibs.zinc; if pandas and pyarrow are there, the Parquet tables are read too; if `gltf_validator.js` is named by GLTF_VALIDATOR (a folder in which
 npm installed gltf-validator) and node is there, the GLB file is validated too.
 """
 
@@ -173,8 +173,37 @@ def check_sto():
     print(f"sto: {len(rows)} rows of {len(names) - 1} activations")
 
 
+def check_parquet():
+    """Every table with the names, the order and the bits of its CSV file; an empty cell is a null."""
+    try:
+        import pandas
+        import pyarrow.parquet
+    except ImportError as error:
+        print(f"SKIPPED: {error.name} is not to be had here, so pandas has not read the Parquet tables")
+        return
+    rows = 0
+    names = sorted(path.stem for path in (run / "tables").glob("*.csv"))
+    assert names == sorted(path.stem for path in (out / "tables").glob("*.parquet"))
+    for name in names:
+        path = out / "tables" / f"{name}.parquet"
+        schema = pyarrow.parquet.read_schema(path)
+        assert set(map(str, schema.types)) <= {"int64", "double", "string"}, (name, schema)
+        read = pandas.read_parquet(path)
+        with open(run / "tables" / f"{name}.csv", newline="") as file:
+            header, *cells = csv.reader(file)
+        assert list(read.columns) == header, (name, header)
+        assert len(read) == len(cells), name
+        for column, (title, kind) in enumerate(zip(header, map(str, schema.types))):
+            for value, row in zip(read[title], cells):
+                known = {"int64": float, "double": float, "string": str}[kind](row[column]) if row[column] else None
+                assert pandas.isna(value) if known is None else value == known, (name, title, value, known)
+        rows += len(read)
+    print(f"parquet: pandas reads {rows} rows in {len(names)} tables, all as in their CSV files")
+
+
 check_mcap()
 check_glb()
 check_validator()
 check_exf()
 check_sto()
+check_parquet()

@@ -40,7 +40,7 @@ pub use coordinates::Coordinates;
 pub use file::ExFile;
 pub use geometry::Geometry;
 pub use inspect::{ExContents, ExFieldContents, inspect};
-pub use write::{Points, write_mesh, write_points};
+pub use write::{Points, write_elements, write_mesh, write_mesh_with, write_points};
 pub use write_angles::write_angles;
 
 /// Labels of nodal parameters, indexed by the bit mask d1 + 2 d2 + 4 d3 of their derivative.

@@ -19,11 +19,15 @@ pub enum Points<'a> {
 /// The text of an EX file with a mesh and fields on it, each with its name and its global parameters. Nodes and elements
 /// are numbered from 1 in the order of the mesh. Read again, it gives the same element parameters to the last bit.
 pub fn write_mesh(mesh: &Mesh, fields: &[(&str, &[Vector])]) -> String {
+    let names: Vec<&str> = fields.iter().map(|(name, _)| *name).collect();
+    write_mesh_with(mesh, fields, &write_elements(mesh, &names))
+}
+
+/// The same with the elements as [`write_elements`] wrote them for fields of these names: no value stands in them.
+pub fn write_mesh_with(mesh: &Mesh, fields: &[(&str, &[Vector])], elements: &str) -> String {
     let mut text = String::from("EX Version: 3\nRegion: /\n");
-    let versions = versions(mesh);
-    write_nodes(&mut text, mesh, fields, &versions);
-    write_elements(&mut text, mesh, fields, &versions);
-    text
+    write_nodes(&mut text, mesh, fields, &versions(mesh));
+    text + elements
 }
 
 /// The text of a region of data points with values on them; it may follow that of a mesh. The path starts with `/`.
@@ -126,12 +130,15 @@ fn write_nodes(text: &mut String, mesh: &Mesh, fields: &[(&str, &[Vector])], ver
     }
 }
 
-fn write_elements(text: &mut String, mesh: &Mesh, fields: &[(&str, &[Vector])], versions: &[usize]) {
+/// The elements of an EX file with fields of these names.
+pub fn write_elements(mesh: &Mesh, fields: &[&str]) -> String {
+    let (mut all, versions) = (String::new(), versions(mesh));
+    let text = &mut all;
     put(text, "!#mesh mesh3d, dimension=3, nodeset=nodes\n");
     let mut templates: HashMap<String, usize> = HashMap::new();
     let mut current = None;
     for element in 0..mesh.elements() {
-        let local = LocalElement::new(mesh, element, versions);
+        let local = LocalElement::new(mesh, element, &versions);
         let header = local.header(mesh, fields);
         let next = templates.len() + 1;
         let template = *templates.entry(header.clone()).or_insert_with(|| {
@@ -153,6 +160,7 @@ fn write_elements(text: &mut String, mesh: &Mesh, fields: &[(&str, &[Vector])], 
             text.push('\n');
         }
     }
+    all
 }
 
 /// An element in its own numbering.
@@ -212,7 +220,7 @@ impl LocalElement {
         columns.map(|column| column.join("+"))
     }
 
-    fn header(&self, mesh: &Mesh, fields: &[(&str, &[Vector])]) -> String {
+    fn header(&self, mesh: &Mesh, fields: &[&str]) -> String {
         let (mut header, mut set) = (String::from("#Scale factor sets=0\n"), "");
         if !self.scales.is_empty() {
             let count = self.scales.len();
@@ -228,7 +236,7 @@ impl LocalElement {
         put(&mut header, &format!("#Nodes={}\n#Fields={}\n", self.nodes.len(), fields.len()));
         let basis =
             if mesh.element.parameters_per_node() == 8 { ["c.Hermite"; 3] } else { ["l.Lagrange"; 3] }.join("*");
-        for (index, (name, _)) in fields.iter().enumerate() {
+        for (index, name) in fields.iter().enumerate() {
             put(&mut header, &field_line(index, name));
             for component in ["x", "y", "z"] {
                 put(&mut header, &format!(" {component}. {basis}, no modify, standard node based.{set}\n"));

@@ -1,12 +1,15 @@
-//! What others open. FAMILY: each format in a file of its own, all made from a [`Playback`].
+//! What others open. FAMILY: each format in a file of its own, made from a [`Playback`], or from the tables alone.
 
 pub mod exf;
 pub mod glb;
+pub mod inspect;
 pub mod mcap;
 pub mod modes;
 pub mod obj;
+pub mod parquet;
 pub mod ply;
 pub mod sto;
+pub mod vtu;
 
 use super::playback::{Playback, Shape};
 use super::run_folder::{failed, write_atomically};
@@ -28,17 +31,23 @@ pub enum Format {
     Obj,
     /// The skin of one frame with its displacement.
     Ply,
+    /// The tables of a run of any task, with types.
+    Parquet,
+    /// The shapes for ParaView, exact and linear.
+    Vtu,
 }
 
 impl Format {
     /// All of them, with their words and what they are for.
-    pub const ALL: [(Format, &'static str, &'static str); 6] = [
+    pub const ALL: [(Format, &'static str, &'static str); 8] = [
         (Format::Glb, "glb", "Blender and game engines: skin, muscles, deformation modes, activation curves"),
         (Format::Mcap, "mcap", "Foxglove, Lichtblick, Rerun: everything over time, with a layout"),
         (Format::Sto, "sto", "OpenSim: activations"),
         (Format::Exf, "exf", "Zinc and cmgui: the exact shape, a file per frame"),
         (Format::Obj, "obj", "anything that reads meshes: skin and muscles of one frame"),
         (Format::Ply, "ply", "the skin of one frame with its displacement"),
+        (Format::Parquet, "parquet", "pandas, R, DuckDB: every table with its types, of a study or of fibres too"),
+        (Format::Vtu, "vtu", "ParaView: the exact shape and the linear one, as they are in the run's view"),
     ];
 }
 
@@ -59,20 +68,34 @@ impl Exported {
     }
 }
 
-/// Writes a run into `folder` in some formats; files of the same name are replaced. `frame` chooses the one that formats of a
-/// single frame show: by default that which moved most.
+/// Writes the run in the folder `run` into `folder` in some formats; files of the same name are replaced. `frame` chooses the
+/// one that formats of a single frame show: by default that which moved most.
 ///
 /// # Errors
-/// [`Error::NoShapes`], [`Error::NoSuchShape`], [`Error::Io`].
-pub fn export(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path) -> Result<Exported> {
+/// [`Error::NotARun`], [`Error::DamagedRun`], [`Error::NoShapes`], [`Error::NoSuchShape`], [`Error::Io`].
+pub fn export(run: &Path, formats: &[Format], frame: Option<usize>, folder: &Path) -> Result<Exported> {
     std::fs::create_dir_all(folder).map_err(failed("create", folder))?;
     let mut done = Exported::default();
+    // tables are there whatever the task, and no shape need be read for them
+    let (of_tables, of_shapes): (Vec<Format>, Vec<Format>) =
+        formats.iter().partition(|format| **format == Format::Parquet);
+    if !of_tables.is_empty() {
+        parquet::write(run, folder, &mut done)?;
+    }
+    if !of_shapes.is_empty() {
+        show(&Playback::read(run)?, &of_shapes, frame, folder, &mut done)?;
+    }
+    Ok(done)
+}
+
+/// Writes the formats that are made from a [`Playback`].
+fn show(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path, done: &mut Exported) -> Result<()> {
     for format in formats {
         match format {
             Format::Glb => done.write(folder.join("result.glb"), glb::file(run)?)?,
-            Format::Mcap => mcap::write(run, folder, &mut done)?,
+            Format::Mcap => mcap::write(run, folder, done)?,
             Format::Sto => done.write(folder.join("activations.sto"), sto::text(run))?,
-            Format::Exf => exf::copy(run, folder, &mut done)?,
+            Format::Exf => exf::copy(run, folder, done)?,
             Format::Obj => {
                 let shape = chosen(run, frame)?;
                 done.write(folder.join(format!("frame_{:04}.obj", shape.frame.index)), obj::text(run, shape))?;
@@ -81,9 +104,11 @@ pub fn export(run: &Playback, formats: &[Format], frame: Option<usize>, folder: 
                 let shape = chosen(run, frame)?;
                 done.write(folder.join(format!("frame_{:04}.ply", shape.frame.index)), ply::file(run, shape))?;
             }
+            Format::Vtu => vtu::copy(run, folder, done)?,
+            Format::Parquet => {}
         }
     }
-    Ok(done)
+    Ok(())
 }
 
 /// The shape of a frame, or that which moved most.

@@ -89,7 +89,9 @@ fn extent(run: &Playback) -> String {
 fn glance(run: &Playback) -> String {
     let mut rows = Vec::new();
     for control in &run.controls {
-        let Some((at, value)) = control.values.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        // of equals the first
+        let values = control.values.iter().copied().enumerate().rev();
+        let Some((at, value)) = values.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             continue;
         };
         let interval = control.intervals[at].map_or("-".into(), |[low, high]| format!("{low:.4} to {high:.4}"));

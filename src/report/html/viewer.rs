@@ -27,7 +27,7 @@ pub(super) fn section(run: &Playback) -> Option<String> {
     }
     let thinned = match every {
         1 => String::new(),
-        _ => format!(" Every {every}th of {} shapes is shown, and the one that moved most.", run.shapes.len()),
+        _ => format!(" One in {every} of {} shapes is shown, and the one that moved most.", run.shapes.len()),
     };
     let markers = if run.markers.is_empty() {
         ""

@@ -1,7 +1,6 @@
 //! What is in the folder of a run, in a few lines.
 
-use super::sheet::Sheet;
-use super::{not_a_run, status};
+use super::{sheets, status};
 use crate::error::Result;
 use crate::report::export::Format;
 use crate::report::status::Status;
@@ -62,18 +61,9 @@ impl Contents {
     /// [`Error::Io`](crate::Error::Io).
     pub fn of(folder: &Path) -> Result<Contents> {
         let status = status(folder)?;
-        let tables = folder.join("tables");
-        let mut rows = BTreeMap::new();
-        for entry in std::fs::read_dir(&tables).map_err(|_| not_a_run(folder, "tables"))?.flatten() {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if let Some(name) = name.strip_suffix(".csv")
-                && let Some(sheet) = Sheet::find(&tables, name)?
-            {
-                rows.insert(name.to_owned(), sheet.len());
-            }
-        }
+        let tables = sheets(folder)?;
         let (mut time_s, mut controls, mut markers) = (None, BTreeMap::new(), BTreeMap::new());
-        if let Some(sheet) = Sheet::find(&tables, "activations")?.filter(|sheet| !sheet.is_empty()) {
+        if let Some(sheet) = tables.get("activations").filter(|sheet| !sheet.is_empty()) {
             let (frame, time) = (sheet.column("frame")?, sheet.column("time_s")?);
             time_s = Some([sheet.known(0, time)?, sheet.known(sheet.len() - 1, time)?]);
             for (column, name) in
@@ -90,7 +80,7 @@ impl Contents {
                 controls.insert(name.clone(), peak);
             }
         }
-        if let Some(sheet) = Sheet::find(&tables, "markers")? {
+        if let Some(sheet) = tables.get("markers") {
             let (name, distance) = (sheet.column("name")?, sheet.column("distance_mm")?);
             for row in 0..sheet.len() {
                 let none = Residual { measured: 0, rms_mm: 0.0, max_mm: 0.0 };
@@ -113,7 +103,7 @@ impl Contents {
             controls,
             markers,
             shapes: seen.shapes,
-            tables: rows,
+            tables: tables.into_iter().map(|(name, sheet)| (name, sheet.len())).collect(),
             bytes: seen.bytes,
         })
     }
@@ -182,7 +172,7 @@ impl fmt::Display for Contents {
         let tables = self.tables.iter().map(|(name, rows)| format!("{name} ({rows})"));
         writeln!(out, "tables, with rows: {}", tables.collect::<Vec<_>>().join(", "))?;
         if self.shapes == 0 {
-            return writeln!(out, "no shapes were kept: --to sto is all that can be exported");
+            return writeln!(out, "no shapes were kept: --to sto,parquet is all that can be exported");
         }
         writeln!(out, "shapes: {} frames", self.shapes)?;
         writeln!(

@@ -22,6 +22,7 @@ use crate::mesh::{MaterialPoint, Mesh};
 use crate::model::build::host;
 use crate::scene::{Problem, Scene, Task};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A run of the task `forward` or `fit`.
@@ -182,6 +183,24 @@ pub fn status(folder: &Path) -> Result<Status> {
     let text = std::fs::read(folder.join("status.json")).map_err(|_| not_a_run(folder, "status.json"))?;
     serde_json::from_slice(&text)
         .map_err(|error| Error::DamagedRun { path: folder.join("status.json"), message: error.to_string().into() })
+}
+
+/// The tables of a run of any task, by their names.
+///
+/// # Errors
+/// [`Error::NotARun`] where there is no folder of tables; [`Error::DamagedRun`]; [`Error::Io`].
+pub fn sheets(run: &Path) -> Result<BTreeMap<String, Sheet>> {
+    let folder = run.join("tables");
+    let mut sheets = BTreeMap::new();
+    for entry in std::fs::read_dir(&folder).map_err(|_| not_a_run(run, "tables"))?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if let Some(name) = name.strip_suffix(".csv")
+            && let Some(sheet) = Sheet::find(&folder, name)?
+        {
+            sheets.insert(name.to_owned(), sheet);
+        }
+    }
+    Ok(sheets)
 }
 
 fn not_a_run(folder: &Path, lacks: &'static str) -> Error {

@@ -1,5 +1,6 @@
 //! A grid of points and cells with fields on them.
 
+use super::xml::Before;
 use crate::error::Result;
 use crate::math::tensor::Vector;
 use crate::report::run_folder::{failed, write_atomically};
@@ -94,7 +95,15 @@ impl Grid {
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
     pub fn write(&self, path: &Path) -> Result<()> {
-        let bytes = super::xml::file(self).map_err(failed("write", path))?;
+        self.write_after(path, &mut Before::default())
+    }
+
+    /// Writes the grid as the next file of a series.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io).
+    pub fn write_after(&self, path: &Path, before: &mut Before) -> Result<()> {
+        let bytes = super::xml::file(self, before).map_err(failed("write", path))?;
         write_atomically(path, &bytes)
     }
 }

@@ -7,17 +7,37 @@ use super::grid::{CellKind, Field, Grid, Values};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::io::{Result, Write};
 
 /// Bytes of a block before compression.
 const BLOCK: usize = 1 << 18;
 
+/// Arrays by their names as they were in the file before, raw and compressed: in a series most of connectivity, reference and
+/// numbers of elements stay as they are, and need not be compressed again.
+#[derive(Debug, Clone, Default)]
+pub struct Before(BTreeMap<String, (Vec<u8>, Vec<u8>)>);
+
+impl Before {
+    /// Appends the compressed bytes of an array.
+    fn append(&mut self, appended: &mut Vec<u8>, name: &str, raw: Vec<u8>) -> Result<()> {
+        if let Some((_, packed)) = self.0.get(name).filter(|(known, _)| *known == raw) {
+            appended.extend_from_slice(packed);
+            return Ok(());
+        }
+        let packed = packed(&raw)?;
+        appended.extend_from_slice(&packed);
+        self.0.insert(name.to_owned(), (raw, packed));
+        Ok(())
+    }
+}
+
 /// The bytes of a VTU file. Version 2.2: below 2.1 VTK permutes the edge nodes of higher-order hexahedra.
 ///
 /// # Errors
 /// Those of the compressor.
-pub fn file(grid: &Grid) -> Result<Vec<u8>> {
-    let mut appended = Vec::new();
+pub fn file(grid: &Grid, before: &mut Before) -> Result<Vec<u8>> {
+    let mut appended = Appended { bytes: Vec::new(), before };
     let on_points = fields(&mut appended, &grid.on_points)?;
     let mut on_cells = fields(&mut appended, &grid.on_cells)?;
     let mut degrees = "";
@@ -54,7 +74,7 @@ pub fn file(grid: &Grid) -> Result<Vec<u8>> {
         grid.cells()
     );
     let mut bytes = head.into_bytes();
-    bytes.append(&mut appended);
+    bytes.append(&mut appended.bytes);
     bytes.extend_from_slice(b"\n</AppendedData>\n</VTKFile>\n");
     Ok(bytes)
 }
@@ -64,7 +84,13 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-fn fields(appended: &mut Vec<u8>, fields: &[Field]) -> Result<String> {
+/// What stands behind the head.
+struct Appended<'b> {
+    bytes: Vec<u8>,
+    before: &'b mut Before,
+}
+
+fn fields(appended: &mut Appended<'_>, fields: &[Field]) -> Result<String> {
     let entry = |field: &Field| match &field.values {
         Values::Scalars(values) => array(appended, field.name, "Float64", 1, floats(values.iter().copied())),
         Values::Vectors(values) => {
@@ -76,9 +102,9 @@ fn fields(appended: &mut Vec<u8>, fields: &[Field]) -> Result<String> {
 }
 
 /// Appends an array; returns its entry in the head.
-fn array(appended: &mut Vec<u8>, name: &str, kind: &str, components: usize, raw: Vec<u8>) -> Result<String> {
-    let offset = appended.len();
-    append(appended, &raw)?;
+fn array(appended: &mut Appended<'_>, name: &str, kind: &str, components: usize, raw: Vec<u8>) -> Result<String> {
+    let offset = appended.bytes.len();
+    appended.before.append(&mut appended.bytes, name, raw)?;
     let name = escape(name);
     Ok(format!(
         "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" \
@@ -86,13 +112,15 @@ fn array(appended: &mut Vec<u8>, name: &str, kind: &str, components: usize, raw:
     ))
 }
 
-fn append(appended: &mut Vec<u8>, raw: &[u8]) -> Result<()> {
+/// The numbers about the blocks, and the blocks.
+fn packed(raw: &[u8]) -> Result<Vec<u8>> {
+    let mut packed = Vec::new();
     let blocks = raw.par_chunks(BLOCK).map(deflated).collect::<Result<Vec<_>>>()?;
     for number in [blocks.len(), BLOCK, raw.len() % BLOCK].into_iter().chain(blocks.iter().map(Vec::len)) {
-        appended.extend_from_slice(&(number as u64).to_le_bytes());
+        packed.extend_from_slice(&(number as u64).to_le_bytes());
     }
-    blocks.iter().for_each(|block| appended.extend_from_slice(block));
-    Ok(())
+    blocks.iter().for_each(|block| packed.extend_from_slice(block));
+    Ok(packed)
 }
 
 fn deflated(raw: &[u8]) -> Result<Vec<u8>> {
