@@ -63,7 +63,7 @@ impl Space {
                 {
                     values[*node] = p;
                 }
-                let reach = mesh.parameter_derivative.iter().map(|derivative| of_derivative(*derivative as u8));
+                let reach = mesh.parameter_derivative.iter().map(|derivative| of_derivative(*derivative));
                 (mesh.map.clone(), values, reach.collect())
             }
             FieldSpec::Tricubic => {

@@ -4,6 +4,7 @@
 //! where it would be if the head had stayed. h_f comes from markers that sit on bone (one robust rigid fit per frame), or from
 //! a topic of poses P: h_f = P_f P_neutral^-1.
 
+use super::bone_shape::shape;
 use super::placement::unknown_label;
 use crate::error::{Cause, Error, Misregistration, Result, Warning};
 use crate::markers::{BoneNoise, Poses, Recording};
@@ -110,9 +111,14 @@ fn from_markers(
         return Err(Error::all(mistakes.into_iter().filter_map(Result::err).collect()));
     }
     let columns: Vec<usize> = columns.into_iter().flatten().collect();
-    let rest: Vec<Option<[f64; 3]>> = columns.iter().map(|c| recording.frames[neutral].positions_mm[*c]).collect();
-    let known: Vec<[f64; 3]> = rest.iter().flatten().copied().collect();
+    let bones: Vec<Vec<Option<[f64; 3]>>> =
+        recording.frames.iter().map(|frame| columns.iter().map(|c| frame.positions_mm[*c]).collect()).collect();
+    let known: Vec<[f64; 3]> = bones[neutral].iter().flatten().copied().collect();
+    if known.len() < 3 {
+        return Err(unknown(fit, neutral, known.len()));
+    }
     let least = SLIPPED * spread(&known);
+    let rest = shape(&bones, neutral, least);
     let mut slips: Vec<Slip> = labels
         .iter()
         .map(|label| Slip { label: label.clone(), frames: 0, shown: 0, first: 0, most_mm: 0.0 })
@@ -120,10 +126,9 @@ fn from_markers(
     let mut frames = Vec::with_capacity(recording.frames.len());
     // those that count in each frame, and what is left of them
     let (mut counted, mut square, mut freedom) = (Vec::with_capacity(recording.frames.len()), 0.0, 0);
-    for (index, frame) in recording.frames.iter().enumerate() {
-        let shown: Vec<usize> =
-            (0..columns.len()).filter(|k| rest[*k].is_some() && frame.positions_mm[columns[*k]].is_some()).collect();
-        let pair = |k: &usize| rest[*k].zip(frame.positions_mm[columns[*k]]);
+    for (index, frame) in bones.iter().enumerate() {
+        let shown: Vec<usize> = (0..columns.len()).filter(|k| rest[*k].is_some() && frame[*k].is_some()).collect();
+        let pair = |k: &usize| rest[*k].zip(frame[*k]);
         let pairs: Vec<Pair> = shown.iter().filter_map(pair).collect();
         let Some(agreed) = robust(&pairs, Allowed::RIGID, least) else {
             frames.push(HeadFrame { motion: None, rms_mm: None, markers: pairs.len() });
@@ -141,20 +146,23 @@ fn from_markers(
         }
         let markers = agreed.off.iter().filter(|off| !**off).count();
         counted.push(shown.iter().zip(&agreed.off).filter(|(_, off)| !**off).map(|(k, _)| *k).collect());
-        if index != neutral {
-            square += agreed.rms * agreed.rms * markers as f64;
-            freedom += (3 * markers).saturating_sub(6);
-        }
+        square += agreed.rms * agreed.rms * markers as f64;
+        freedom += (3 * markers).saturating_sub(6);
         frames.push(HeadFrame { motion: Some(agreed.motion), rms_mm: Some(agreed.rms), markers });
     }
-    if frames[neutral].motion.is_none() {
+    let Some(back) = frames[neutral].motion.map(|motion| motion.inverse()) else {
         return Err(unknown(fit, neutral, known.len()));
+    };
+    for frame in &mut frames {
+        frame.motion = frame.motion.map(|motion| back.then(&motion));
     }
     slips.retain(|slip| slip.frames > 0);
-    // the noise of the neutral frame is in every distance too
+    // the shape was found from the same places, but for where it is
+    let freedom = freedom.saturating_sub((3 * rest.iter().flatten().count()).saturating_sub(6));
     let noise = (freedom > 0).then(|| BoneNoise {
-        variance_mm2: 0.5 * square / freedom as f64,
+        variance_mm2: square / freedom as f64,
         neutral_mm: rest,
+        neutral,
         shown: counted,
     });
     Ok((frames, slips, noise))

@@ -37,21 +37,19 @@ pub(super) struct HeadError {
 impl HeadError {
     /// Of a frame; `None` where the head was not found from bone markers, or without noise.
     pub fn of(recording: &Recording, frame: usize) -> Option<HeadError> {
-        let BoneNoise { variance_mm2, neutral_mm, shown } = recording.bones.as_ref()?;
+        let BoneNoise { variance_mm2, neutral_mm, neutral, shown } = recording.bones.as_ref()?;
         if *variance_mm2 < ROUNDING {
             return None;
         }
         let centre = middle(neutral_mm);
-        let covariance = |bones: &mut dyn Iterator<Item = [f64; 3]>| {
+        let covariance = |frame: usize| {
             let mut information = Matrix6::zeros();
-            for h in bones.map(|x| by_head(x, centre)) {
+            for h in shown.get(frame)?.iter().filter_map(|bone| Some(by_head(neutral_mm[*bone]?, centre))) {
                 information += h.transpose() * h;
             }
             Some(information.cholesky()?.inverse() * *variance_mm2)
         };
-        let own = covariance(&mut shown.get(frame)?.iter().filter_map(|bone| neutral_mm[*bone]))?;
-        let common = covariance(&mut neutral_mm.iter().flatten().copied())?;
-        Some(HeadError { own, common, centre })
+        Some(HeadError { own: covariance(frame)?, common: covariance(*neutral)?, centre })
     }
 
     /// The standard deviation that the head of this frame gives a place, along the direction where it is greatest, mm.

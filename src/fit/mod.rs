@@ -12,6 +12,7 @@
 
 pub mod advise;
 pub mod bias;
+mod bone_shape;
 pub mod bounded_step;
 pub mod covariance;
 pub mod estimate;

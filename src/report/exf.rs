@@ -37,15 +37,23 @@ pub fn text(model: &Model, state: &State, common: &Common) -> String {
     let x = model.current(state);
     let [coordinates, deformed] = FIELDS;
     let fields = [(coordinates, mesh.parameters.as_slice()), (deformed, x.as_slice())];
-    let mut text = write_mesh_with(mesh, &fields, &common.elements);
+    let (host, muscles) =
+        rayon::join(|| write_mesh_with(mesh, &fields, &common.elements), || points(model, state, &x, common));
+    host + &muscles
+}
+
+/// The region of the muscles, whose host has the parameters `x`; nothing without muscles.
+fn points(model: &Model, state: &State, x: &[Vector], common: &Common) -> String {
+    let mesh = model.mesh();
+    let [coordinates, deformed] = FIELDS;
     let (mut position, mut fibre) = (Vec::new(), Vec::new());
     let (mut stretch, mut activation, mut number) = (Vec::new(), Vec::new(), Vec::new());
     for (index, (_, muscle)) in model.muscles().enumerate() {
         for in_element in muscle.points().chunk_by(|a, b| a.host.element == b.host.element) {
-            let local = mesh.local_of(in_element[0].host.element, &x);
+            let local = mesh.local_of(in_element[0].host.element, x);
             for point in in_element {
                 let v = point.deformed_fibre(&local);
-                position.push(mesh.interpolate(point.host, &x));
+                position.push(mesh.interpolate(point.host, x));
                 fibre.push(normalised(v));
                 stretch.push(norm(v));
                 activation.push(point.activation(&state.controls));
@@ -53,18 +61,18 @@ pub fn text(model: &Model, state: &State, common: &Common) -> String {
             }
         }
     }
-    if !position.is_empty() {
-        let fields = [
-            Points::Vectors(coordinates, &common.points),
-            Points::Vectors(deformed, &position),
-            Points::Vectors("fibre", &fibre),
-            Points::Scalars("stretch", &stretch),
-            Points::Scalars("activation", &activation),
-            Points::Scalars("muscle", &number),
-        ];
-        text += &write_points("/muscles", &fields);
+    if position.is_empty() {
+        return String::new();
     }
-    text
+    let fields = [
+        Points::Vectors(coordinates, &common.points),
+        Points::Vectors(deformed, &position),
+        Points::Vectors("fibre", &fibre),
+        Points::Scalars("stretch", &stretch),
+        Points::Scalars("activation", &activation),
+        Points::Scalars("muscle", &number),
+    ];
+    write_points("/muscles", &fields)
 }
 
 /// Writes the file, atomically.

@@ -5,6 +5,7 @@
 
 use super::{DEGREE, directions, fitted, problem};
 use risorius::fibres::Axis;
+use risorius::math::tensor::Vector;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};
 use risorius::mesh::fibre_angles::FibreAngles;
@@ -33,7 +34,7 @@ fn axes_are_those_of_zinc() {
 #[test]
 fn angles_are_found_from_the_axes_of_zinc() {
     for mesh in boxes() {
-        let axis = |(k, &(element, xi, fibre, sheet)): (usize, &(usize, [f64; 3], [f64; 3], [f64; 3]))| Axis {
+        let axis = |(k, &(element, xi, fibre, sheet)): (usize, &Evaluated)| Axis {
             position: mesh.position(MaterialPoint { element, xi }),
             fibre,
             sheet: Some(sheet),
@@ -96,9 +97,12 @@ const ANGLES: [[f64; 3]; 36] = [
     [0.016864358270, -0.082570135883, 0.440622504288],
 ];
 
-/// Element, xi, fibre, sheet: as Zinc evaluates them.
+/// Element, xi, fibre, sheet.
+type Evaluated = (usize, Vector, Vector, Vector);
+
+/// As Zinc evaluates them.
 #[rustfmt::skip]
-const AXES: [(usize, [f64; 3], [f64; 3], [f64; 3]); 48] = [
+const AXES: [Evaluated; 48] = [
     (0, [0.323833, 0.150849, 0.650934], [0.9843862426, 0.1758452392, 0.0078852581], [-0.1623477108, 0.9243142101, -0.3453787222]),
     (0, [0.072436, 0.535882, 0.365689], [0.9672963906, 0.2508167893, -0.0377972346], [-0.2516720933, 0.9676098223, -0.019808818]),
     (0, [0.057999, 0.507436, 0.037496], [0.9954068819, 0.0934614801, -0.0207386382], [-0.0934072432, 0.9956215828, 0.0035708233]),

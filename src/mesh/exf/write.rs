@@ -5,7 +5,6 @@ use crate::math::tensor::Vector;
 use crate::mesh::Mesh;
 use crate::mesh::map::Term;
 use std::collections::HashMap;
-use std::fmt::Write;
 
 /// Values on points: name, then one value per point.
 #[derive(Debug, Clone, Copy)]
@@ -73,8 +72,8 @@ fn put(text: &mut String, more: &str) {
 
 /// A number with the fewest digits that give the same bits again.
 fn put_number(text: &mut String, value: f64) {
-    // writing to a String does not fail
-    let _ = write!(text, " {value:?}");
+    text.push(' ');
+    text.push_str(ryu::Buffer::new().format(value));
 }
 
 fn field_line(index: usize, name: &str) -> String {
