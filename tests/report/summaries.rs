@@ -28,6 +28,7 @@ fn forward_summary_shows_the_last_frame() {
         external_work: model.external_work(&found.state),
         reactions: &[(12.5, -3.25)],
         det_f: found.evaluation.det_f,
+        volume_change: -2.5e-4,
         mesh_errors: &MeshErrors::default(),
         iterations: work.iterations,
         seconds: 1.234,
@@ -37,6 +38,7 @@ fn forward_summary_shows_the_last_frame() {
     println!("{text}");
     for part in [
         "bend: 2 frames in equilibrium, 1 frame NOT CONVERGED",
+        "the volume changes by -0.025 %",
         "rotation 0: torque 12.5000 mN mm, axial force -3.2500 mN",
         &format!("{:.4}", probes[0].displacement[2]),
         &format!("{:.4}", muscles[1].mean_stretch),

@@ -76,7 +76,8 @@ fn tables_have_their_columns_and_every_bit() {
     EnergyTable::create(&run, &model).and_then(|mut t| t.add(FRAME, &model, &found)).expect("written");
     let rows = table("energies");
     let muscles = MUSCLES.map(|name| format!("{name}_uj"));
-    let tail = columns("external_work_uj,det_f_min,det_f_max,negative_modes,torque_0_mn_mm,axial_force_0_mn");
+    let tail =
+        columns("external_work_uj,det_f_min,det_f_max,volume_change,negative_modes,torque_0_mn_mm,axial_force_0_mn");
     let head = columns("frame,time_s,tissue_uj");
     assert_eq!(rows[0], [&head[..], &muscles[..], &tail[..]].concat());
     let e = &found.evaluation;
@@ -85,7 +86,9 @@ fn tables_have_their_columns_and_every_bit() {
     assert!(e.energies[0] > 0.0 && work_of_loads > 0.0 && reactions[0].0 != 0.0);
     assert_eq!(found.negative_modes, Some(0));
     let expected = [e.energies[0], e.energies[1], e.energies[2], work_of_loads, e.det_f.min, e.det_f.max];
-    assert_eq!(numbers(&rows[1][2..]), [&expected[..], &[0.0, reactions[0].0, reactions[0].1]].concat());
+    let change = model.mesh().volume(&x) / model.mesh().volume(&model.mesh().parameters) - 1.0;
+    assert!(change != 0.0);
+    assert_eq!(numbers(&rows[1][2..]), [&expected[..], &[change, 0.0, reactions[0].0, reactions[0].1]].concat());
 
     MarkerTable::create(&run).and_then(|mut t| t.add(FRAME, &some_markers())).expect("written");
     let rows = table("markers");
