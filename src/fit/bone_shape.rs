@@ -75,7 +75,7 @@ mod tests {
     fn what_the_neutral_frame_has_lost_is_found_in_others() {
         let mut frames: Vec<Vec<Option<Vector>>> = (0..6).map(moved).collect();
         (frames[0][1], frames[0][4]) = (None, None);
-        // never three of the neutral frame's and both of the others at once
+        // other frames have lost others
         (frames[2][0], frames[3][2], frames[4][3], frames[5][4]) = (None, None, None, None);
         for (found, truth) in shape(&frames, 0, 0.4).iter().zip(BONES) {
             let apart = norm(subtract(found.unwrap(), truth));
