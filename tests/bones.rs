@@ -1,8 +1,7 @@
 //! Bones that move: what they carry, sensitivities through it, reactions, and a fit that finds where the jaw was.
 
-mod common;
-
-use common::assert_close;
+use crate::common;
+use crate::common::assert_close;
 use risorius::fit::Fit;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Equilibrium, Settings, Solver};

@@ -1,9 +1,7 @@
 //! Clips as they come from a laboratory (noise, bursts of dropouts, zeros, outliers, a head that moves) against the truth: a small
 //! part of the table of `examples/twin_table.rs`, which is in `problems/fit_study/README.md`.
 
-mod common;
-
-use common::clips::{Conditions, Head, Score, fit, positions, record, truth};
+use crate::common::clips::{Conditions, Head, Score, fit, positions, record, truth};
 
 const FRAMES: usize = 24;
 

@@ -1,8 +1,6 @@
 //! The families of contact: every surface has exact derivatives of its gap, every law those of its energy.
 
-mod common;
-
-use common::{Random, assert_close, curved_block};
+use crate::common::{Random, assert_close, curved_block};
 use risorius::math::tensor::{Matrix, Vector, add_scaled, apply, dot, norm, normalised, subtract};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

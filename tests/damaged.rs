@@ -1,8 +1,6 @@
 //! The folder of a run in which a file is not what it was: a clear error or what is left of it, never a panic.
 
-mod common;
-
-use common::twin::{MARKERS, MUSCLES, problem, record};
+use crate::common::twin::{MARKERS, MUSCLES, problem, record};
 use risorius::error::Result;
 use risorius::report::export::{Format, export};
 use risorius::report::html;

@@ -1,9 +1,8 @@
 //! Every element and pressure space, and the geometry built from them: what is interpolated, how elements join, how
 //! points are found again.
 
-mod common;
-
-use common::{Random, assert_close, curved_block, largest};
+use crate::common;
+use crate::common::{Random, assert_close, curved_block, largest};
 use risorius::math::quadrature::GaussRule;
 use risorius::math::tensor::{IDENTITY, Matrix, Vector, cross, determinant, dot, norm, subtract};
 use risorius::mesh::bezier::{bounding_box, control_values, evaluate};

@@ -1,12 +1,10 @@
 //! Are known fibre fields found again from axes, and is what the data do not say told?
 
-mod common;
-#[path = "fibres/tricubic.rs"]
 mod tricubic;
-#[path = "fibres/zinc.rs"]
 mod zinc;
 
-use common::Random;
+use crate::common;
+use crate::common::Random;
 use risorius::fibres::{Axis, FibreFit, fit};
 use risorius::math::tensor::{Vector, add_scaled, cross, dot, norm, normalised};
 use risorius::mesh::block::block;

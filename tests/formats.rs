@@ -1,22 +1,16 @@
 //! Messages and files of other programs: are their markers read as they were written, and damaged ones never wrongly?
 
-#[path = "recordings/files.rs"]
-mod files;
-#[path = "recordings/others.rs"]
-mod others;
-#[path = "recordings/writer.rs"]
-mod writer;
-
+use crate::recordings::files::{Processor, Tracks};
+use crate::recordings::others::{Entities, Shown};
+use crate::recordings::writer::{Topic, container, file};
+use crate::recordings::{files, others};
 use assert_cmd::Command;
-use files::{Processor, Tracks};
-use others::{Entities, Shown};
 use risorius::markers::{
     Clock, Fault, Missing, ReadOptions, Recording, Units, Warning, inspect_bytes, read, read_bytes,
 };
 use risorius::{Error, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use writer::{Topic, container, file};
 
 const START: i64 = 1_700_000_000_000_000_000;
 

@@ -2,13 +2,10 @@
 //!
 //! The twin is that of `tests/twin.rs` (reference/beam_twin.json, an independent implementation).
 
-mod common;
-#[path = "recordings/others.rs"]
-mod others;
-#[path = "recordings/writer.rs"]
-mod writer;
-
-use common::BEAM_FIT;
+use crate::common;
+use crate::common::BEAM_FIT;
+use crate::recordings::others;
+use crate::recordings::writer::{Message, Ros2Marker, Topic, container, file, ros2_message};
 use risorius::fit::registration::{Registration, register};
 use risorius::fit::{Estimate, Fit, placement, recording};
 use risorius::markers::{Clock, ReadOptions, read_poses_bytes};
@@ -19,7 +16,6 @@ use risorius::scene::Scene;
 use risorius::{Error, Warning};
 use std::fmt::Write;
 use std::path::Path;
-use writer::{Message, Ros2Marker, Topic, container, file, ros2_message};
 
 #[derive(serde::Deserialize)]
 struct Twin {

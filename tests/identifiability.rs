@@ -1,8 +1,6 @@
 //! What the markers tell: intervals, combinations and pairs, residuals that no control explains, advice on markers.
 
-mod common;
-
-use common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
+use crate::common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
 use nalgebra::DMatrix;
 use risorius::fit::advise::{Criterion, View, advise, candidates};
 use risorius::fit::covariance::Bound;

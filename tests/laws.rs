@@ -1,8 +1,6 @@
 //! Every law of the tissue and the law of the fibres: at rest, derivatives, frame indifference, symmetry.
 
-mod common;
-
-use common::{Random, assert_close, product};
+use crate::common::{Random, assert_close, product};
 use num_dual::{DualNum, HyperDual64};
 use risorius::material::fibre::{Blemker, active};
 use risorius::material::{Guccione, Law, MooneyRivlin, NeoHookean, PAIRS};

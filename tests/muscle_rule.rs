@@ -1,8 +1,6 @@
 //! Where a muscle has its quadrature points, and how much of its fibres is left there.
 
-mod common;
-
-use common::{Random, curved_block};
+use crate::common::{Random, curved_block};
 use risorius::material::fibre::Blemker;
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

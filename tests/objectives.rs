@@ -1,9 +1,7 @@
 //! The parts of the objective of a fit: derivatives, what each does to the answer, the keys that ask for them.
 
-mod common;
-
-use common::Random;
-use common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
+use crate::common::Random;
+use crate::common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
 use nalgebra::DMatrix;
 use risorius::fit::objective::{Instant, Objectives, Past, Sum};
 use risorius::fit::sequence::sought;

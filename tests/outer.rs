@@ -1,9 +1,7 @@
 //! What all frames share: stiffness, strength and the direction of fibres come back from several poses, with intervals that hold
 //! the truth; what cannot be told from activations is said to be so.
 
-mod common;
-
-use common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
+use crate::common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
 use risorius::error::Warning;
 use risorius::fit::outer::{Outcome, find};
 use risorius::fit::sequence::sought;

@@ -1,10 +1,9 @@
 //! Is every code that has a page given by something that a test does? Here are those that no other test comes upon, and the count.
 
-mod common;
-
+use crate::common;
+use crate::common::Random;
+use crate::common::twin::{MARKERS, MUSCLES, normal, problem, record};
 use assert_cmd::Command;
-use common::Random;
-use common::twin::{MARKERS, MUSCLES, normal, problem, record};
 use risorius::error::explain::pages;
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,7 +1,8 @@
 //! Are recordings read as they were written, and damaged ones never wrongly?
 
-#[path = "recordings/writer.rs"]
-mod writer;
+pub mod files;
+pub mod others;
+pub mod writer;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;

@@ -1,9 +1,7 @@
 //! Is what keeps a recording from lying on its model told by name? The rows of a table of classic mistakes, on markers that are
 //! nearly symmetric, as those of a face are.
 
-mod common;
-
-use common::Random;
+use crate::common::Random;
 use risorius::fit::placement::place;
 use risorius::fit::registration::{Registration, register};
 use risorius::markers::{Frame, ReadOptions, Recording, WriteOptions, read, write_json};

@@ -1,9 +1,7 @@
 //! A fit that is ended from outside goes on where it was, to the same tables with the same bytes.
 #![cfg(unix)]
 
-mod common;
-
-use common::twin::{MARKERS, MUSCLES, problem, record};
+use crate::common::twin::{MARKERS, MUSCLES, problem, record};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;

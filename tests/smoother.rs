@@ -1,8 +1,6 @@
 //! A clip as a whole: what smoothing gains, whether its intervals hold the truth, frames that fail.
 
-mod common;
-
-use common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
+use crate::common::twin::{MARKERS, MUSCLES, problem, record, recording, scene};
 use risorius::fit::covariance::Bound;
 use risorius::fit::identifiability::Evidence;
 use risorius::fit::{Estimate, Fit};

@@ -1,9 +1,8 @@
 //! Every term: force = dPi/dx, stiffness = dforce/dx, control and load forces; rigid motion costs nothing; parameter
 //! maps assemble like the mesh they stand for; the same bits on any number of threads.
 
-mod common;
-
-use common::{Random, assert_close, curved_block, product};
+use crate::common;
+use crate::common::{Random, assert_close, curved_block, product};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::material::MooneyRivlin;
 use risorius::material::fibre::Blemker;

@@ -5,9 +5,7 @@
 //! slabs of 50 x 16 x 4 mm (5 x 2 x 1 elements, 3 x 3 x 3 points) at (4.5, 2, 14.2), fibre angle 0, and at (4.5, 2, 1.8),
 //! 36 degrees; `truth[frame]` are the activations (top, bottom), `positions_mm[frame][marker]` the markers, without noise.
 
-mod common;
-
-use common::BEAM_FIT;
+use crate::common::BEAM_FIT;
 use risorius::fit::covariance::Bound;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::fit::{Estimate, Fit};

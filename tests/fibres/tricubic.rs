@@ -1,7 +1,7 @@
 //! Tricubic fields of angles: found again, C1, better than trilinear ones on the same mesh, kept by EX files.
 
-use super::common::{self, Random};
 use super::{DEGREE, apart, directions, disturbed, errors, fitted, most, problem, ring, sampled};
+use crate::common::{self, Random};
 use risorius::Place;
 use risorius::fibres::space::Space;
 use risorius::fibres::{Axis, FibreFit};

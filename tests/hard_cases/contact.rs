@@ -1,6 +1,6 @@
 //! Contact that opens and closes at very few points.
 
-use crate::record::{difference, drive, solver, stable};
+use super::record::{difference, drive, solver, stable};
 use risorius::model::build::build;
 use risorius::report::contact_states;
 use risorius::scene::Scene;

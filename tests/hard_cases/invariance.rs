@@ -1,7 +1,7 @@
 //! What must not matter: units and the direction of the axes.
 
-use crate::record::{drive, solver, stable};
-use crate::support::{Discretisation, model, side};
+use super::record::{drive, solver, stable};
+use crate::verification::support::{Discretisation, model, side};
 use risorius::forward::{Equilibrium, Settings};
 use risorius::math::tensor::{Matrix, Vector, apply, rotation};
 use risorius::mesh::block::block;

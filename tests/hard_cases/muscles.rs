@@ -1,7 +1,7 @@
 //! Muscles beyond what a face does with them.
 
-use crate::record::{difference, drive, solver, stable};
-use crate::support::{Discretisation, FIBRE, TISSUE, model, side, slab_beam};
+use super::record::{difference, drive, solver, stable};
+use crate::verification::support::{Discretisation, FIBRE, TISSUE, model, side, slab_beam};
 use risorius::forward::Equilibrium;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};

@@ -1,7 +1,7 @@
 //! Paths: no load, too much load, many loads, guesses that are no good.
 
-use crate::record::{assert_in_balance, attempt, cantilever, clamped_with_pull, difference, drive, solver, stable};
-use crate::support::{Discretisation, slab_beam};
+use super::record::{assert_in_balance, attempt, cantilever, clamped_with_pull, difference, drive, solver, stable};
+use crate::verification::support::{Discretisation, slab_beam};
 use risorius::Error;
 use risorius::error::Likely;
 use risorius::forward::{Settings, Solver, StepKind, evaluate};

@@ -1,6 +1,6 @@
 //! What every hard case must show, and the row that tells how it ended.
 
-use crate::support::{Discretisation, model, side};
+use crate::verification::support::{Discretisation, model, side};
 use risorius::forward::{Drive, Equilibrium, Failure, Settings, Solver, StepKind, evaluate};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

@@ -1,7 +1,7 @@
 //! Turned, thin and squeezed elements; volumetric terms from none to very stiff.
 
-use crate::record::{attempt, cantilever, clamped_with_pull, drive, solver, stable};
-use crate::support::{Discretisation, model, moved, side, slab_beam_of};
+use super::record::{attempt, cantilever, clamped_with_pull, drive, solver, stable};
+use crate::verification::support::{Discretisation, model, moved, side, slab_beam_of};
 use risorius::forward::Equilibrium;
 use risorius::math::tensor::{apply, rotation};
 use risorius::mesh::Mesh;

@@ -1,8 +1,8 @@
 //! Paths that turn back: a shallow arch, a column, a muscle on its descending limb.
 
-use crate::muscles::{muscle_cube, nominal_stress};
-use crate::record::{clamped_with_pull, difference, drive, solver, stable};
-use crate::support::{Discretisation, model, side};
+use super::muscles::{muscle_cube, nominal_stress};
+use super::record::{clamped_with_pull, difference, drive, solver, stable};
+use crate::verification::support::{Discretisation, model, side};
 use risorius::forward::Equilibrium;
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

@@ -1,7 +1,7 @@
 //! Contact in tables and shapes: a cube of 20 mm pressed on a plane by 0.9 kPa through a penalty of 20 kPa/mm, from a
 //! problem file.
 
-use crate::support::{FRAME, run_in, temporary};
+use super::support::{FRAME, run_in, temporary};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::model::build::build;
 use risorius::report::tables::ContactTable;

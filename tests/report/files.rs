@@ -1,7 +1,7 @@
 //! Run folder, status, manifest: nobody shares them, nothing is half written.
 
-use crate::model::model;
-use crate::support::{run_in, temporary};
+use super::model::model;
+use super::support::{run_in, temporary};
 use risorius::Error;
 use risorius::forward::Work;
 use risorius::report::run_folder::write_atomically;

@@ -1,8 +1,8 @@
 //! VTU: are the cells the elements, and do all arrays come back?
 
-use crate::model::{Random, crumpled, model};
-use crate::support::{FRAME, run_in, some_markers, temporary};
-use crate::vtu_reader::{Vtu, attribute};
+use super::model::{Random, crumpled, model};
+use super::support::{FRAME, run_in, some_markers, temporary};
+use super::vtu_reader::{Vtu, attribute};
 use risorius::forward::evaluate;
 use risorius::math::tensor::{apply, determinant, norm, normalised, subtract};
 use risorius::mesh::{MaterialPoint, position_and_jacobian};

@@ -1,7 +1,7 @@
 //! The page at the end of a run.
 
-use crate::model::{MUSCLES, model};
-use crate::support::{FRAME, solved, some_markers};
+use super::model::{MUSCLES, model};
+use super::support::{FRAME, solved, some_markers};
 use risorius::fit::covariance::Bound;
 use risorius::fit::identifiability::ClipKnowledge;
 use risorius::mesh::MaterialPoint;

@@ -1,7 +1,7 @@
 //! Tables: the documented columns, and every bit of every number.
 
-use crate::model::{MUSCLES, model};
-use crate::support::{FRAME, run_in, solved, some_markers, temporary};
+use super::model::{MUSCLES, model};
+use super::support::{FRAME, run_in, solved, some_markers, temporary};
 use risorius::mesh::MaterialPoint;
 use risorius::report::tables::{
     ActivationTable, ConvergenceTable, EnergyTable, MarkerTable, MuscleTable, ProbeTable, write_cost,

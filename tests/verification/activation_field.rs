@@ -1,6 +1,6 @@
 //! A muscle whose activation is a field: sensitivities by all nodal activations, and a twin whose field is found again.
 
-use crate::support::assert_close;
+use super::support::assert_close;
 use risorius::fit::Fit;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Equilibrium, Settings, Solver};

@@ -3,7 +3,7 @@
 //! An incompressible bar stretched by lambda has nominal stress dW/dlambda of W(lambda, lambda^-1/2, lambda^-1/2). Side by
 //! side every region keeps its own stress. What springs hold adds up to the loads.
 
-use crate::support::{moved, solve};
+use super::support::{moved, solve};
 use risorius::forward::Equilibrium;
 use risorius::mesh::face::Side;
 use risorius::mesh::location::Locator;

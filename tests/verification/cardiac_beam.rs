@@ -5,7 +5,7 @@
 //! Guccione's law takes the whole strain, as the benchmark states it; its body is incompressible, so that the isochoric part
 //! would give the same. Ours comes to 4.1529 on 10 x 1 x 1 elements, 4.1665 on 20 x 2 x 2 and 4.1687 on 40 x 4 x 4.
 
-use crate::support::{Discretisation, body, moved, side, solve};
+use super::support::{Discretisation, body, moved, side, solve};
 use risorius::material::Guccione;
 use risorius::mesh::block::block;
 use risorius::mesh::element::TricubicHermite;

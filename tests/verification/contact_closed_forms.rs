@@ -1,6 +1,6 @@
 //! Contact where the answer is known: a block pressed on a plane, a sector that slides on a cylinder.
 
-use crate::support::{Discretisation, TISSUE, assert_close, model, side};
+use super::support::{Discretisation, TISSUE, assert_close, model, side};
 use risorius::forward::{Drive, Equilibrium, Settings, Solver};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

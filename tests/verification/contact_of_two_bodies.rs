@@ -1,8 +1,8 @@
 //! Contact of two deformable bodies where the answer is known: uniform pressure through meshes that do not match, and a
 //! body that meets its mirror image as it meets a rigid plane.
 
-use crate::contact_closed_forms::{contact, contact_points, solve_to};
-use crate::support::{Discretisation, assert_close, model, side};
+use super::contact_closed_forms::{contact, contact_points, solve_to};
+use super::support::{Discretisation, assert_close, model, side};
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Equilibrium, Settings, Solver};
 use risorius::mesh::block::block;

@@ -1,8 +1,8 @@
 //! Sensitivities through converged sliding and contact: implicit against differences of whole equilibria, on an active
 //! set that is partly closed and the same on both sides.
 
-use crate::contact_closed_forms::{contact, contact_points};
-use crate::support::{Discretisation, assert_close, model, side};
+use super::contact_closed_forms::{contact, contact_points};
+use super::support::{Discretisation, assert_close, model, side};
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::mesh::block::block;

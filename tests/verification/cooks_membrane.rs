@@ -5,7 +5,7 @@
 //! The bulk modulus is 5000 times the shear modulus: the pressure takes its part, and the body is incompressible. The
 //! energy of volume beside the pressure is a numerical choice, 10 mu here.
 
-use crate::support::{Discretisation, body, moved, side, solve};
+use super::support::{Discretisation, body, moved, side, solve};
 use risorius::material::NeoHookean;
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;

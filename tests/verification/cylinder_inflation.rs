@@ -6,7 +6,7 @@
 //!   pressure = integral over r of 2 (lambda_t^2 - lambda_r^2) (c1 + c2 lambda_z^2) / r
 //! gives r_i = 1.0705817593, r_o = 1.2434409127. A quarter of the tube between symmetry planes; plates pull its ends.
 
-use crate::support::{Discretisation, body, moved, side, solve};
+use super::support::{Discretisation, body, moved, side, solve};
 use risorius::material::MooneyRivlin;
 use risorius::math::tensor::Vector;
 use risorius::mesh::Mesh;

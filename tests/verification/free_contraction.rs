@@ -8,7 +8,7 @@
 //! The stretches below are roots of this equation with Table 2 of Wu et al. 2013, found independently; the equation is
 //! solved here once more.
 
-use crate::support::{Discretisation, FIBRE, TISSUE, model, side, solve};
+use super::support::{Discretisation, FIBRE, TISSUE, model, side, solve};
 use risorius::mesh::MaterialPoint;
 use risorius::mesh::block::block;
 use risorius::mesh::element::{TricubicHermite, Trilinear};

@@ -3,8 +3,8 @@
 //! The block has a finite depth H and is fixed below: the factor 1 + 1.133 c + 1.283 c^2 + 0.769 c^3 + 0.0975 c^4 with
 //! c = sqrt(R d) / H (Dimitriadis et al. 2002, Eq. 12). A quarter is meshed, fine elements near the contact.
 
-use crate::contact_closed_forms::{contact, contact_points, solve_to};
-use crate::support::{Discretisation, model, side};
+use super::contact_closed_forms::{contact, contact_points, solve_to};
+use super::support::{Discretisation, model, side};
 use risorius::math::tensor::norm;
 use risorius::mesh::block::block;
 use risorius::mesh::element::TricubicHermite;

@@ -6,7 +6,7 @@
 //!   P = 2 (c1 + c2 I1) F - 2 c2 F C - (2/3 (c1 I1 + 2 c2 I2) + p) F^-T     at J = 1
 //! On curved Hermite geometry the integrands have degree 8: five Gauss points per direction are exact, four are not.
 
-use crate::support::{Discretisation, TISSUE, model};
+use super::support::{Discretisation, TISSUE, model};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::math::tensor::{IDENTITY, Matrix, Vector, apply, determinant, dot, inverse};
 use risorius::mesh::Mesh;

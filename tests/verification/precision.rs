@@ -1,6 +1,6 @@
 //! A factor in single precision: the same equilibria and sensitivities, as solutions are refined in double precision.
 
-use crate::support::assert_close;
+use super::support::assert_close;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::math::factor::Precision;

@@ -6,7 +6,7 @@
 //! dr_da, energies, and at every muscle point position X, weight W, fibre n0, host element and xi, stretch lam.
 //! Its second Euler angle tips the fibre towards +f3: the opposite sign of our imbrication.
 
-use crate::support::{Discretisation, FIBRE, TISSUE, assert_close, parameters, reference};
+use super::support::{Discretisation, FIBRE, TISSUE, assert_close, parameters, reference};
 use risorius::material::PAIRS;
 use risorius::mesh::Mesh;
 use risorius::mesh::element::{TricubicHermite, Trilinear};

@@ -10,7 +10,7 @@
 //!   d/dr = cos(theta) Gx + sin(theta) Gy,   d2/(dr dtheta) = - sin(theta) Gx + cos(theta) Gy,   d/dtheta = 0,
 //! so that every field is C1 on the axis too.
 
-use crate::support::{Discretisation, TISSUE, model, solve};
+use super::support::{Discretisation, TISSUE, model, solve};
 use risorius::math::tensor::Vector;
 use risorius::mesh::Mesh;
 use risorius::mesh::element::{TricubicHermite, ends};

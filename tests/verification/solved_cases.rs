@@ -3,7 +3,7 @@
 //! All with Table 2 of Wu et al. 2013, trilinear pressure and 4 x 4 x 4 Gauss points. Files: `u[node][derivative]
 //! [component]` (mm), `p[node]` (kPa), energies (uJ), the range of det F over the Gauss points.
 
-use crate::support::{
+use super::support::{
     Discretisation, SolvedState, assert_close, model, parameters, reference, side, slab_beam, solve,
 };
 use risorius::forward::{Drive, Settings, Solver};

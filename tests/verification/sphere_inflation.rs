@@ -10,7 +10,7 @@
 //! that no element is collapsed at a pole. Elements share edges and faces, but no derivatives across them. Errors are the
 //! largest on a surface, within elements too; they fall with the third power of the size, as a trilinear pressure lets them.
 
-use crate::support::{Discretisation, body, solve};
+use super::support::{Discretisation, body, solve};
 use risorius::material::MooneyRivlin;
 use risorius::math::tensor::{Vector, norm};
 use risorius::mesh::continuous::continuous;

@@ -4,7 +4,7 @@
 //! Uniaxial stretch lambda: nominal stress 2 (lambda - lambda^-2)(c1 + c2/lambda).
 //! Simple shear gamma: shear stress 2 (c1 + c2) gamma, energy (c1 + c2) gamma^2 per volume.
 
-use crate::support::{Discretisation, TISSUE, model, side, solve};
+use super::support::{Discretisation, TISSUE, model, side, solve};
 use risorius::mesh::MaterialPoint;
 use risorius::mesh::block::block;
 use risorius::mesh::element::TricubicHermite;

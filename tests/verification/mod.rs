@@ -16,5 +16,5 @@ mod prescribed_state;
 mod rivlin_torsion;
 mod solved_cases;
 mod sphere_inflation;
-mod support;
+pub mod support;
 mod uniaxial_and_shear;
