@@ -628,20 +628,23 @@ fn points_of_ex_files_are_read() {
     assert!(read("points.exf", text.as_bytes(), Some("sheet")).unwrap_err().to_string().contains("but fibre"));
 }
 
-/// The work grows with the data and no faster: `examples/million_axes.rs` has ten times as many, in 8 s (release build, idle cores).
+/// Few passes over the data, however many they are: `examples/million_axes.rs` has ten times as many, in 8 s (release build, idle cores).
 #[test]
-fn a_hundred_thousand_axes_take_seconds() {
+fn a_hundred_thousand_axes_take_few_steps() {
     let mesh = block(&TricubicHermite, [0.0; 3], [100.0, 80.0, 35.0], [10, 8, 7]);
     let truth = FibreAngles::uniform(&mesh, [20.0 * DEGREE, 5.0 * DEGREE, 0.0]);
     let mut random = Random::new(60);
     let mut data = sampled(&mesh, &truth, 180, &mut random);
     data.iter_mut().for_each(|axis| axis.fibre = disturbed(axis.fibre, 10.0 * DEGREE, &mut random));
-    let start = std::time::Instant::now();
     let found = fitted(&FibreProblem { folds: 5, ..problem(AnglesSpec::AB) }, &mesh, &data);
-    let seconds = start.elapsed().as_secs_f64();
     let worst = most(&errors(&mesh, &truth, &found, &mut random));
-    println!("{} axes on {} elements: {seconds:.1} s, {worst:.2} degrees off at most", data.len(), mesh.elements());
-    assert!(seconds < 10.0 && worst < 3.0, "{seconds} s, {worst} degrees");
+    println!(
+        "{} axes on {} elements: {} steps, {worst:.2} degrees off at most",
+        data.len(),
+        mesh.elements(),
+        found.steps
+    );
+    assert!(found.steps <= 12 && worst < 3.0, "{} steps, {worst} degrees", found.steps);
 }
 
 /// From files to files with the program: a muscle's angles, and then the muscle with them.

@@ -300,7 +300,8 @@ pub(super) fn muscle(table: &mut Table, references: &References, host: Option<&M
     let activations = [("uniform", ActivationSpec::Uniform), ("field", ActivationSpec::Field)];
     let activation = table.or("activation", ActivationSpec::Uniform, |item| item.choice(&activations, &[]));
     let gauss = table.or("gauss", 3, |item| item.whole(1, 8));
-    let cut = table.or("cut", false, |item| item.flag());
+    // the meshes of a face are refined while their muscles stay
+    let cut = table.or("cut", in_face, |item| item.flag());
     let taper_mm = table.optional("taper_mm", |item| item.number(POSITIVE));
     let fibre_turn_deg = table.or("fibre_turn_deg", [0.0; 4], |item| {
         let angles = item.list("a list of 4 numbers", |entry| entry.number(FINITE))?;
