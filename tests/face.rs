@@ -16,7 +16,7 @@ use risorius::report::frame::contact_states;
 use risorius::scene::{GeometrySpec, Scene, built_in_face};
 use risorius::term::contact::surface::{Arch, RigidSurface};
 use risorius::term::muscle::Muscle;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 const WHOLE: Options = Options { layers: 1, halved: false, half: false };
@@ -174,11 +174,24 @@ fn every_named_face_is_where_its_name_says() {
     assert_eq!((count("lip.upper"), count("lip.lower"), count("lid.upper.L"), count("lid.lower.R")), (6, 6, 4, 4));
     let parts = ["deep.perioral", "deep.nose", "deep.sliding", "deep.eye.L", "deep.eye.R"].map(count);
     assert_eq!(parts.iter().sum::<usize>(), 560, "{parts:?}");
+    // the border: on the skull above the line between the lips, on the jaw below the chin, on neither between them
+    let parts = ["rim", "rim.skull", "rim.jaw"].map(|name| whole.named_faces[name].clone());
+    assert_eq!(parts.each_ref().map(Vec::len), [96, 28 + 2 * 14, 16]);
+    assert!(parts[1].iter().chain(&parts[2]).all(|face| parts[0].contains(face)));
+    let nodes = |faces: &[Face]| -> BTreeSet<usize> {
+        faces.iter().flat_map(|f| f.side.nodes().map(|k| whole.corners[f.element][k])).collect()
+    };
+    assert!(nodes(&parts[1]).is_disjoint(&nodes(&parts[2])));
     // what lies on the jaw ends at the line between the lips
     for part in ["deep.perioral", "deep.sliding"] {
         let height = |face: &Face| whole.position(MaterialPoint { element: face.element, xi: [0.5, 0.5, 0.0] })[1];
         let [jaw, skull] = ["jaw", "skull"].map(|bone| &whole.named_faces[&format!("{part}.{bone}")]);
-        assert_eq!(jaw.len() + skull.len(), count(part));
+        // the cheeks between the two lie on neither
+        let cheek = whole.named_faces.get(&format!("{part}.cheek")).map_or(0, Vec::len);
+        assert_eq!(
+            (jaw.len() + skull.len() + cheek, cheek),
+            (count(part), if part == "deep.sliding" { 40 } else { 0 })
+        );
         let mouth = |face: &&Face| (12..16).contains(&(face.element % 28));
         assert!(jaw.iter().filter(mouth).all(|face| height(face) < landmark("cheilion").position[1]));
         assert!(skull.iter().filter(mouth).all(|face| height(face) > landmark("cheilion").position[1]));

@@ -21,10 +21,12 @@ pub struct Options {
 }
 
 /// The names of faces that the mesh of a face has beside its sides; `midline` only a half, those in `.R` only a whole face.
-pub const FACES: [&str; 19] = [
+pub const FACES: [&str; 22] = [
     "skin",
     "deep",
     "rim",
+    "rim.skull",
+    "rim.jaw",
     "midline",
     "lip.upper",
     "lip.lower",
@@ -39,6 +41,7 @@ pub const FACES: [&str; 19] = [
     "deep.perioral.jaw",
     "deep.sliding.skull",
     "deep.sliding.jaw",
+    "deep.sliding.cheek",
     "deep.eye.L",
     "deep.eye.R",
 ];
@@ -260,20 +263,26 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
         } else {
             let perioral = PERIORAL.0.contains(&row) && column < PERIORAL.1;
             let part = if perioral { "deep.perioral" } else { "deep.sliding" };
+            let cheek = !perioral && CHEEK.0.contains(&row) && column < CHEEK.1;
             let bone = if row < MOUTH_ROW { "jaw" } else { "skull" };
             add(part, deep);
-            add(&format!("{part}.{bone}"), deep);
+            add(&format!("{part}.{}", if cheek { "cheek" } else { bone }), deep);
         }
     }
-    let outermost = from_middle + 1 == COLUMNS * fine;
-    if outermost {
-        add("rim", if s < 0 { side(0, 0) } else { side(0, 1) });
+    let mut border = |side: FaceSide, bone: Option<&str>| {
+        add("rim", side);
+        if let Some(bone) = bone {
+            add(&format!("rim.{bone}"), side);
+        }
+    };
+    if from_middle + 1 == COLUMNS * fine {
+        border(if s < 0 { side(0, 0) } else { side(0, 1) }, (row >= MOUTH_ROW).then_some("skull"));
     }
     if t == 0 {
-        add("rim", side(1, 0));
+        border(side(1, 0), (column < CHIN_END).then_some("jaw"));
     }
     if t + 1 == ROWS * fine {
-        add("rim", side(1, 1));
+        border(side(1, 1), Some("skull"));
     }
     if options.half && s == 0 {
         add("midline", side(0, 0));
@@ -301,3 +310,8 @@ fn names(s: i64, t: usize, layer: usize, fine: usize, options: Options) -> Vec<(
 const NOSE: (std::ops::Range<usize>, usize) = (8..14, 3);
 /// Rows and columns (from the midline) of the tissue that lies on teeth and jaws: from the chin to below the base of the nose.
 const PERIORAL: (std::ops::Range<usize>, usize) = (2..8, 5);
+/// Rows and columns (from the midline) of the tissue between the jaws, which lies on the mucosa and on no bone: where a jaw that
+/// opens turns away from the skull.
+const CHEEK: (std::ops::Range<usize>, usize) = (4..8, 10);
+/// Columns of the lower border below the chin and the body of the jaw, from the midline.
+const CHIN_END: usize = 8;
