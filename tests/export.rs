@@ -417,6 +417,7 @@ fn inspect_tells_what_a_run_holds() {
     for words in ["converged, 4 frames", "bottom", "B07", "markers (48)", "shapes: 4 frames", "--to glb,mcap,sto"] {
         assert!(page.contains(words), "`{words}` is not in\n{page}");
     }
+    assert!(page.contains("model: 24 elements, 63 nodes, ") && page.contains(" unknowns, 2 muscles\n"), "{page}");
     assert_eq!(exit, 0);
     let (_, page, _) = risorius(&["inspect", &folder, "--json"]);
     let value: Value = serde_json::from_str(&page).unwrap();
