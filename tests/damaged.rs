@@ -118,7 +118,7 @@ fn a_damaged_table_is_named() {
     let table = run.join("tables/markers.csv");
     let text = fs::read_to_string(&table).expect("there");
     fs::write(&table, text.replacen("M0,", "M0,none", 1)).expect("written");
-    for arguments in [&["export", "run", "--to", "sto"][..], &["report", "run"]] {
+    for arguments in [&["export", "run", "--to", "glb"][..], &["report", "run"]] {
         let mut command = assert_cmd::Command::cargo_bin("risorius").expect("the program");
         let output = command.current_dir(&folder).args(arguments).output().expect("it runs");
         let stderr = String::from_utf8_lossy(&output.stderr);

@@ -213,7 +213,7 @@ fn check_says_what_is_on_and_off_and_cost_csv_has_a_row_for_what_is_on() {
         let parts = cost.lines().skip(1).map(|row| row.split(',').next().unwrap_or_default().to_owned()).collect();
         (page, parts)
     };
-    const SOLVER: [&str; 4] = ["assembly", "factorisation", "solve", "output"];
+    const SOLVER: [&str; 5] = ["assembly", "factorisation", "solve", "output", "writing"];
     let (page, parts): (String, Vec<String>) = run("base", "");
     assert_eq!(parts, [&["tissue", "traction"][..], &SOLVER].concat());
     let off = line(&page, "effects off:");

@@ -417,10 +417,41 @@ fn inspect_tells_what_a_run_holds() {
     for words in ["converged, 4 frames", "bottom", "B07", "markers (48)", "shapes: 4 frames", "--to glb,mcap,sto"] {
         assert!(page.contains(words), "`{words}` is not in\n{page}");
     }
+    assert!(page.contains("model: 24 elements, 63 nodes, ") && page.contains(" unknowns, 2 muscles\n"), "{page}");
     assert_eq!(exit, 0);
     let (_, page, _) = risorius(&["inspect", &folder, "--json"]);
     let value: Value = serde_json::from_str(&page).unwrap();
     assert_eq!((&value["status"], &value["controls"]["bottom"]["frame"]), (&"converged".into(), &30.into()));
+}
+
+/// What is made from tables reads no shape, and what is copied takes it as it is.
+#[test]
+fn what_needs_no_shapes_does_not_read_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("run");
+    for part in ["tables", "view", "view/linear"] {
+        fs::create_dir_all(copy.join(part)).unwrap();
+        for entry in
+            fs::read_dir(run().join(part)).unwrap().map(Result::unwrap).filter(|entry| entry.path().is_file())
+        {
+            fs::copy(entry.path(), copy.join(part).join(entry.file_name())).unwrap();
+        }
+    }
+    for name in ["status.json", "problem.lock.toml"] {
+        fs::copy(run().join(name), copy.join(name)).unwrap();
+    }
+    for frame in ["0000", "0010", "0020", "0030"] {
+        fs::write(copy.join(format!("view/result_{frame}.exf")), "no shape").unwrap();
+    }
+    let path = copy.display().to_string();
+    let (exit, _, stderr) = risorius(&["export", &path, "--to", "glb"]);
+    assert!(exit != 0 && stderr.contains("result_0000.exf"), "{stderr}");
+    let (exit, _, stderr) = risorius(&["export", &path, "--to", "sto,parquet,exf,vtu"]);
+    assert_eq!(exit, 0, "{stderr}");
+    for name in ["activations.sto", "tables/activations.parquet", "result.pvd", "result.com"] {
+        assert!(fs::read(copy.join("export").join(name)).unwrap() == fs::read(export(name)).unwrap(), "{name}");
+    }
+    assert_eq!(fs::read(copy.join("export/result_0020.exf")).unwrap(), b"no shape");
 }
 
 #[test]
@@ -459,6 +490,6 @@ fn what_cannot_be_exported_says_why() {
     );
     let markers = folder.path().join("blind/tables/markers.csv");
     fs::write(&markers, fs::read_to_string(&markers).unwrap().replacen("x_mm", "x_cm", 1)).unwrap();
-    let (exit, _, stderr) = risorius(&["export", &out, "--to", "sto"]);
+    let (exit, _, stderr) = risorius(&["export", &out, "--to", "glb"]);
     assert!(exit == 6 && stderr.contains("error[O005]") && stderr.contains("no column `x_mm`"), "{stderr}");
 }

@@ -86,6 +86,7 @@ fn killed_and_interrupted_fits_go_on_to_the_same_bytes() {
         let kept = frames_kept(&folder.path().join("cut"));
         // every frame that was told of, and none that was not finished
         assert!((3..FRAMES).contains(&kept), "{kept} frames");
+        assert_tells_its_model(folder.path(), "cut");
         // interrupted on the way, then to the end
         assert_eq!(ended_after(folder.path(), &["resume", "cut", "--progress=plain"], kept + 4, "-INT"), Some(130));
         let later = frames_kept(&folder.path().join("cut"));
@@ -100,6 +101,22 @@ fn killed_and_interrupted_fits_go_on_to_the_same_bytes() {
         let again = risorius(folder.path(), &["resume", "cut"], 0);
         assert!(String::from_utf8_lossy(&again.stderr).contains("nothing to do"));
     }
+}
+
+/// What is known of a run from its beginning is told, whatever ended it.
+fn assert_tells_its_model(folder: &Path, run: &str) {
+    let inspected = risorius(folder, &["inspect", run, "--json"], 0).stdout;
+    let inspected: serde_json::Value = serde_json::from_slice(&inspected).expect("json");
+    let size = |key: &str| inspected["numerics"][key].as_u64().unwrap_or_else(|| panic!("{key}: {inspected}"));
+    let whole = std::fs::read(folder.join("whole/manifest.json")).expect("a manifest");
+    let whole: serde_json::Value = serde_json::from_slice(&whole).expect("json");
+    for key in ["elements", "nodes", "muscles", "unknowns"] {
+        assert_eq!(whole["numerics"][key], size(key), "{key}");
+    }
+    let words = format!("{} tricubic Hermite elements ({} nodes, ", size("elements"), size("nodes"));
+    risorius(folder, &["report", run], 0);
+    let page = std::fs::read_to_string(folder.join(run).join("report.html")).expect("a page");
+    assert!(page.contains(&words), "the page does not say `{words}`");
 }
 
 /// A limit on the size of files stands for a full disk: the run ends with an error of output, and goes on when there is room.

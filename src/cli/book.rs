@@ -1,32 +1,30 @@
-//! All that a fit writes of its frames: rows, shapes, the page.
+//! What a fit finds, frame by frame: what is written of each, and the page at the end.
 
 use super::Flags;
-use super::estimate::Estimates;
+use super::estimate::{Estimated, Estimates};
 use super::noticed::noticed;
 use super::outer::PAGE;
-use super::progress::{Meter, took};
 use super::run::{Run, Tally};
 use super::telling::Telling;
 use super::terminal::print;
+use super::writer::Desk;
 use crate::error::{Result, Warning};
 use crate::fit::advise::MarkerHelp;
 use crate::fit::free_head::{FreeHead, page};
+use crate::fit::identifiability::Told;
 use crate::fit::registration::Registration;
 use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::model::Model;
 use crate::report::state::SavedFrame;
 use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors, Outliers};
-use crate::report::{Frame, MarkerPair, MeshError, Outlier, Record};
+use crate::report::{Frame, MarkerPair, MeshError, Outlier};
 use crate::scene::{ControlRange, Scene};
 
 /// The frames so far.
 pub(super) struct Book<'a> {
     model: &'a Model,
-    /// Names of markers, and of controls with their units.
-    pub names: Vec<String>,
-    pub labels: Vec<String>,
-    pub record: Record<'a>,
+    names: &'a Names,
     telling: Telling,
     pub estimates: Estimates<'a>,
     pub tally: Tally,
@@ -37,6 +35,22 @@ pub(super) struct Book<'a> {
     outliers: Outliers,
 }
 
+/// What is named in rows.
+pub(super) struct Names {
+    pub markers: Vec<String>,
+    /// Controls with their units.
+    pub controls: Vec<String>,
+}
+
+/// A frame that converged, with all that is written of it.
+pub(super) struct Entry<'a> {
+    names: &'a Names,
+    pub saved: SavedFrame,
+    told: Option<Told>,
+    /// What is shown of it.
+    warnings: Vec<Warning>,
+}
+
 /// What a frame was found to be besides its fit, or what an earlier process had found.
 pub(super) enum Beside<'f, 'm> {
     /// To be found now, with the fit as the frame left it.
@@ -45,22 +59,43 @@ pub(super) enum Beside<'f, 'm> {
     Known { error: Option<MeshError>, unestimated: Option<String>, help: Option<MarkerHelp> },
 }
 
-impl<'a> Book<'a> {
-    pub fn new(
-        model: &'a Model,
-        scene: &Scene,
-        fit: &Fit<'_>,
-        record: Record<'a>,
-        estimates: Estimates<'a>,
-    ) -> Book<'a> {
+impl Names {
+    pub fn new(model: &Model, scene: &Scene, fit: &Fit<'_>) -> Names {
         let ranges = scene.control_ranges();
-        let labels: Vec<String> = model.controls().iter().map(|control| label(&control.name, &ranges)).collect();
+        Names {
+            markers: fit.markers().iter().map(|m| m.name.clone()).collect(),
+            controls: model.controls().iter().map(|control| label(&control.name, &ranges)).collect(),
+        }
+    }
+}
+
+impl Entry<'_> {
+    /// Writes rows and shapes, and shows what is to be known of the frame.
+    pub fn write(&self, Desk { record, meter }: &mut Desk<'_>, flags: &Flags) -> Result<()> {
+        let Entry { names, saved: SavedFrame { estimate, error, .. }, told, warnings } = self;
+        let frame = Frame { index: estimate.frame, time_s: estimate.time_s };
+        let markers = pairs(&names.markers, estimate);
+        let aside = set_aside(&names.markers, &markers, estimate);
+        record.frame(frame, &estimate.equilibrium, &markers, &estimate.iterations)?;
+        record.objectives(frame, &estimate.costs, &aside)?;
+        if let Some(error) = error {
+            record.estimate(frame, error)?;
+        }
+        if let Some(told) = told {
+            record.told(frame, told, (&names.controls, &names.markers), &biases(error.as_ref()))?;
+        }
+        record.done(frame, &estimate.equilibrium, &estimate.sd)?;
+        warnings.iter().for_each(|warning| meter.warn(warning, flags));
+        Ok(())
+    }
+}
+
+impl<'a> Book<'a> {
+    pub fn new(model: &'a Model, names: &'a Names, fit: &Fit<'_>, estimates: Estimates<'a>) -> Book<'a> {
         Book {
             model,
-            names: fit.markers().iter().map(|m| m.name.clone()).collect(),
-            telling: Telling::new(model.mesh(), fit, labels.clone()),
-            labels,
-            record,
+            names,
+            telling: Telling::new(model.mesh(), fit, names.controls.clone()),
             estimates,
             tally: Tally::default(),
             heads: Vec::new(),
@@ -70,48 +105,35 @@ impl<'a> Book<'a> {
         }
     }
 
-    /// Writes a frame that converged; gives back all that it was made of.
-    pub fn frame(
-        &mut self,
-        estimate: Estimate,
-        fit: &Fit<'_>,
-        beside: Beside<'_, '_>,
-        meter: &mut Meter,
-        flags: &Flags,
-    ) -> Result<SavedFrame> {
+    /// Takes a frame that converged; gives back what is to be written of it.
+    pub fn frame(&mut self, estimate: Estimate, fit: &Fit<'_>, beside: Beside<'_, '_>) -> Result<Entry<'a>> {
         let frame = Frame { index: estimate.frame, time_s: estimate.time_s };
-        let markers = pairs(&self.names, &estimate);
-        let aside = set_aside(&self.names, &markers, &estimate);
+        let markers = pairs(&self.names.markers, &estimate);
         self.errors.add(frame, &markers);
-        self.outliers.add(&aside);
-        self.record.frame(frame, &estimate.equilibrium, &markers, &estimate.iterations)?;
-        self.record.objectives(frame, &estimate.costs, &aside)?;
-        let is_known = matches!(beside, Beside::Known { .. });
-        let mut warn = |tally: &mut Tally, warnings: Vec<Warning>| match is_known {
-            true => tally.keep(frame, &warnings),
-            false => tally.warn(frame, warnings, meter, flags),
-        };
-        warn(&mut self.tally, noticed(frame, self.model, &estimate.equilibrium));
+        self.outliers.add(&set_aside(&self.names.markers, &markers, &estimate));
+        let mut warnings: Vec<Warning> = estimate.bridged.then(|| bridged(frame)).into_iter().collect();
+        warnings.extend(noticed(frame, self.model, &estimate.equilibrium));
         let (error, unestimated, live, known_help) = match beside {
             Beside::Fresh(fit) => {
-                let found = self.estimates.fit(frame, &estimate, fit, &self.labels, &mut self.record)?;
-                let unestimated = found.warning.as_ref().map(|warning| warning.message.clone());
-                warn(&mut self.tally, found.warning.into_iter().collect());
-                (found.error, unestimated, true, None)
+                let Estimated { error, warning } = self.estimates.fit(frame, &estimate, fit, &self.names.controls);
+                let unestimated = warning.as_ref().map(|warning| warning.message.clone());
+                warnings.extend(warning);
+                (error, unestimated, true, None)
             }
             Beside::Known { error, unestimated, help } => {
-                if let Some(error) = &error {
-                    self.estimates.known(frame, error, &mut self.record)?;
-                }
-                let warning =
-                    |message: &String| Warning { code: "S013", message: message.clone(), place: None, help: None };
-                warn(&mut self.tally, unestimated.iter().map(warning).collect());
+                error.iter().for_each(|error| self.estimates.known(frame, error));
+                let warning = |message| Warning { code: "S013", message, place: None, help: None };
+                warnings.extend(unestimated.clone().map(warning));
                 (error, unestimated, false, help)
             }
         };
-        let biases: Vec<_> = error.iter().flat_map(|e| e.biases.iter().map(|(_, bias)| *bias)).collect();
-        let help = self.telling.frame(frame, &estimate, fit, (live, known_help), &biases, &mut self.record)?;
-        self.record.done(frame, &estimate.equilibrium, &estimate.sd)?;
+        self.tally.keep(frame, &warnings);
+        if !live {
+            // an earlier process has shown them
+            warnings.clear();
+        }
+        let biases = biases(error.as_ref());
+        let (told, help) = self.telling.frame(frame, &estimate, fit, (live, known_help), &biases)?;
         // one that is bridged stays among those that failed
         self.tally.frames_ok += usize::from(!estimate.bridged);
         self.heads.extend(estimate.head.clone().map(|head| (estimate.frame, head)));
@@ -121,7 +143,8 @@ impl<'a> Book<'a> {
             deviations: estimate.sd.clone(),
             bounds: estimate.bounds.clone(),
         });
-        Ok(SavedFrame { estimate, error, unestimated, help })
+        let saved = SavedFrame { estimate, error, unestimated, help };
+        Ok(Entry { names: self.names, saved, told, warnings })
     }
 
     /// Writes what is known at the end, prints the page.
@@ -131,16 +154,15 @@ impl<'a> Book<'a> {
         (fit, registration): (&Fit<'_>, &Registration),
         work: &Work,
         run: &Run,
-        (meter, flags): (&mut Meter, &Flags),
+        (mut desk, flags): (Desk<'_>, &Flags),
     ) -> Result<Tally> {
         if let Some((frame, warning)) = self.telling.warning() {
-            self.tally.warn(frame, vec![warning], meter, flags);
+            self.tally.warn(frame, vec![warning], &desk.meter, flags);
         }
-        self.record.told_of_clip(&self.telling.clip, &self.labels)?;
-        took(&run.log, flags, "of that: write tables and shapes", self.record.seconds());
-        self.record.finish(work, self.estimates.cost().as_ref().map(|(work, seconds)| (work, *seconds)))?;
-        let controls: Vec<&str> = self.labels.iter().map(String::as_str).collect();
-        let sought: Vec<&str> = fit.unknowns().iter().map(|k| self.labels[*k].as_str()).collect();
+        desk.record.told_of_clip(&self.telling.clip, &self.names.controls)?;
+        desk.finish(work, self.estimates.cost(), &run.log, flags)?;
+        let controls: Vec<&str> = self.names.controls.iter().map(String::as_str).collect();
+        let sought: Vec<&str> = fit.unknowns().iter().map(|k| controls[*k]).collect();
         // none where all frames share nothing that was sought
         let shared = std::fs::read_to_string(run.folder.path().join(PAGE)).unwrap_or_default();
         let summary = FitSummary {
@@ -155,7 +177,7 @@ impl<'a> Book<'a> {
             objective: &fit.words(),
             outliers: &self.outliers,
             told: &self.telling.clip,
-            markers: &self.names,
+            markers: &self.names.markers,
             iterations: work.iterations,
             seconds: run.start.elapsed().as_secs_f64(),
             folder: &run.folder.path().display().to_string(),
@@ -165,6 +187,20 @@ impl<'a> Book<'a> {
         print(&text)?;
         Ok(self.tally)
     }
+}
+
+fn bridged(Frame { index, .. }: Frame) -> Warning {
+    Warning {
+        code: "F012",
+        message: format!("frame {index} failed and is bridged: what stands there is what its neighbours say"),
+        place: None,
+        help: None,
+    }
+}
+
+/// What every control that is sought is too great by; nothing where the error was not estimated.
+fn biases(error: Option<&MeshError>) -> Vec<Option<f64>> {
+    error.iter().flat_map(|error| error.biases.iter().map(|(_, bias)| *bias)).collect()
 }
 
 /// The name of a control, with its unit where it has one.

@@ -1,4 +1,4 @@
-//! The error of the mesh, estimated beside a run: for the page, the tables and the cost.
+//! The error of the mesh, estimated in the frames of a run: for the page, the tables and the cost.
 
 use super::prepare::Prepared;
 use crate::error::{Result, Warning};
@@ -9,7 +9,7 @@ use crate::math::tensor::norm;
 use crate::mesh::MaterialPoint;
 use crate::model::State;
 use crate::report::summary::MeshErrors;
-use crate::report::{Frame, MeshError, Probe, Record};
+use crate::report::{Frame, MeshError, Probe};
 
 /// The outcome of one estimate; neither where none was asked for.
 #[derive(Default)]
@@ -42,21 +42,14 @@ impl<'m> Estimates<'m> {
         Ok(Estimates { estimator, names, points, errors: MeshErrors::default() })
     }
 
-    /// Estimates the errors of the probes in an equilibrium and writes them; gives the warning where that fails.
-    pub fn forward(&mut self, frame: Frame, state: &State, record: &mut Record<'_>) -> Result<Option<Warning>> {
-        Ok(self.frame(frame, "probe", state, record, |_| Vec::new())?.warning)
+    /// Estimates the errors of the probes in an equilibrium.
+    pub fn forward(&mut self, frame: Frame, state: &State) -> Estimated {
+        self.frame(frame, "probe", state, |_| Vec::new())
     }
 
     /// The same of the markers and of the controls that were fitted.
-    pub fn fit(
-        &mut self,
-        frame: Frame,
-        fitted: &Estimate,
-        fit: &Fit<'_>,
-        labels: &[String],
-        record: &mut Record<'_>,
-    ) -> Result<Estimated> {
-        self.frame(frame, "marker", &fitted.equilibrium.state, record, |shift| {
+    pub fn fit(&mut self, frame: Frame, fitted: &Estimate, fit: &Fit<'_>, labels: &[String]) -> Estimated {
+        self.frame(frame, "marker", &fitted.equilibrium.state, |shift| {
             let biases = bias(fitted, fit.markers(), fit.unknowns(), shift);
             fit.unknowns().iter().map(|control| (labels[*control].clone(), biases[*control])).collect()
         })
@@ -67,10 +60,9 @@ impl<'m> Estimates<'m> {
         frame: Frame,
         kind: &'static str,
         state: &State,
-        record: &mut Record<'_>,
         biases: impl FnOnce(&[[f64; 3]]) -> Vec<(String, Option<f64>)>,
-    ) -> Result<Estimated> {
-        let Some(estimator) = &mut self.estimator else { return Ok(Estimated::default()) };
+    ) -> Estimated {
+        let Some(estimator) = &mut self.estimator else { return Estimated::default() };
         let corrected = match estimator.corrected(state) {
             Ok(corrected) => corrected,
             Err(error) => {
@@ -80,7 +72,7 @@ impl<'m> Estimates<'m> {
                     place: None,
                     help: error.help(),
                 };
-                return Ok(Estimated { error: None, warning: Some(warning) });
+                return Estimated { error: None, warning: Some(warning) };
             }
         };
         let shift = estimator.shift(state, &corrected, &self.points);
@@ -90,16 +82,13 @@ impl<'m> Estimates<'m> {
             points: self.names.iter().cloned().zip(shift.iter().map(|s| norm(*s))).collect(),
             biases: biases(&shift),
         };
-        record.estimate(frame, &error)?;
         self.errors.add(frame, &error, estimator.work().iterations, estimator.seconds());
-        Ok(Estimated { error: Some(error), warning: None })
+        Estimated { error: Some(error), warning: None }
     }
 
-    /// Writes what an earlier process had estimated.
-    pub fn known(&mut self, frame: Frame, error: &MeshError, record: &mut Record<'_>) -> Result<()> {
-        record.estimate(frame, error)?;
+    /// Takes what an earlier process had estimated.
+    pub fn known(&mut self, frame: Frame, error: &MeshError) {
         self.errors.add(frame, error, 0, 0.0);
-        Ok(())
     }
 
     /// What further estimates depend on.

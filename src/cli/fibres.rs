@@ -39,7 +39,7 @@ pub(super) fn run(problem: &FibreProblem, path: &Path, flags: &Flags) -> Result<
         tally.frames_ok = 1;
         Ok(tally)
     });
-    finish(&run, None, &Work::default(), outcome, flags)
+    finish(&run, &Work::default(), outcome, flags)
 }
 
 /// Everything but the fit.

@@ -1,13 +1,14 @@
 //! Task `fit`: activations from a recording, frame after frame.
 
 use super::Flags;
-use super::book::{Beside, Book};
+use super::book::{Beside, Book, Entry, Names};
 use super::estimate::Estimates;
 use super::forward::probes;
 use super::prepare::{Clip, Prepared};
 use super::progress::Meter;
 use super::run::{Run, Tally};
-use crate::error::{Result, Warning};
+use super::writer::{Desk, Writer, beside};
+use crate::error::{Error, Result};
 use crate::fit::free_head::FreeHead;
 use crate::fit::head::{HeadFrame, HeadMotion};
 use crate::fit::placement::Marker;
@@ -22,7 +23,6 @@ use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome}
 use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
-use std::time::Instant;
 
 /// Fits every frame that is not done, keeps and writes it, prints the page.
 pub(super) fn fit(
@@ -44,30 +44,94 @@ pub(super) fn fit(
     let record = Record::create(&run.folder, &built.model, &probes, &scene.output, true)?;
     let placed = fit.markers().iter().map(|m| (m.name.clone(), m.point));
     let estimates = Estimates::new(prepared, settings(scene), placed)?;
-    let mut book = Book::new(&built.model, scene, &fit, record, estimates);
+    let names = Names::new(&built.model, scene, &fit);
+    let mut book = Book::new(&built.model, &names, &fit, estimates);
     for (frame, warning) in &run.noticed {
         book.tally.keep(*frame, std::slice::from_ref(warning));
     }
-    let mut meter = Meter::new(flags, frames.len(), Some(&run.log));
-    let mut done = 0;
+    let meter = Meter::new(flags, frames.len(), Some(&run.log));
+    let mut desk = Desk { record, meter };
     // frames wait for the others where the clip is smoothed
     let smoothed = spec.objectives.clip == ClipSpec::Smoother;
+    beside(&mut desk, |writer| {
+        let clip = (recording, frames.as_slice());
+        let passed = pass(&mut fit, clip, smoothed, (checkpoints, left), &mut book, writer, (run, flags))?;
+        match smoothed && !book.tally.interrupted {
+            true => smooth(&mut fit, clip, &passed, &mut book, writer, (run, flags)),
+            false => Ok(()),
+        }
+    })?;
+    desk.meter.finish();
+    *work = fit.work();
+    let sought: Vec<&str> = fit.unknowns().iter().map(|k| names.controls[*k].as_str()).collect();
+    if !book.heads.is_empty() {
+        write_free_head(&run.folder, &sought, &free_heads(&book.heads, registration, recording))?;
+    }
+    book.finish(scene, (&fit, registration), work, run, (desk, flags))
+}
+
+/// How a frame ended.
+enum Ended<'a> {
+    /// It is written.
+    Fitted(Box<Entry<'a>>),
+    /// It waits for the others.
+    Waits(Box<Estimate>),
+    Failed(Error),
+}
+
+impl Ended<'_> {
+    /// Writes and says what is to be known of a frame; gives back what is kept of it.
+    fn write(self, frame: Frame, desk: &mut Desk<'_>, flags: &Flags) -> Result<SavedOutcome> {
+        Ok(match self {
+            Ended::Fitted(entry) => {
+                entry.write(desk, flags)?;
+                SavedOutcome::Fitted(Box::new(entry.saved))
+            }
+            Ended::Waits(estimate) => {
+                let saved = SavedFrame { estimate: *estimate, error: None, unestimated: None, help: None };
+                SavedOutcome::Fitted(Box::new(saved))
+            }
+            Ended::Failed(error) => {
+                desk.meter.fail(&error, flags);
+                SavedOutcome::Failed(FailedFrame::new(frame.index, &error))
+            }
+        })
+    }
+}
+
+/// Takes the frames that are done, fits the others one after the other, and hands each over to be written and kept; gives back those
+/// that wait for the others, `None` for each that failed.
+fn pass<'a>(
+    fit: &mut Fit<'_>,
+    (recording, frames): (&Recording, &[usize]),
+    smoothed: bool,
+    (checkpoints, left): (&'a Checkpoints, Option<Left>),
+    book: &mut Book<'a>,
+    writer: &mut Writer<'a>,
+    (run, flags): (&'a Run, &'a Flags),
+) -> Result<Vec<Option<Estimate>>> {
+    let mut done = 0;
     let mut passed: Vec<Option<Estimate>> = Vec::new();
     if let Some(Left { frames, carried }) = left {
         done = frames.len();
         for outcome in frames {
+            let mut entry = None;
             match outcome {
                 SavedOutcome::Fitted(saved) if smoothed => passed.push(Some(saved.estimate)),
                 SavedOutcome::Fitted(saved) => {
                     let SavedFrame { estimate, error, unestimated, help } = *saved;
-                    book.frame(estimate, &fit, Beside::Known { error, unestimated, help }, &mut meter, flags)?;
+                    entry = Some(book.frame(estimate, fit, Beside::Known { error, unestimated, help })?);
                 }
                 SavedOutcome::Failed(failed) => {
                     passed.push(None);
                     book.tally.failed.push(failed);
                 }
             }
-            meter.frame("done before", &[]);
+            writer.write(move |desk| {
+                entry.map_or(Ok(()), |entry| entry.write(desk, flags))?;
+                desk.meter.frame("done before", &[]);
+                Ok(())
+            })?;
         }
         if let Some(Carried { fit: memory, halved }) = carried {
             fit.restore(memory)?;
@@ -83,7 +147,7 @@ pub(super) fn fit(
         let before = fit.work().linear.factorisations;
         let said;
         let mut numbers = vec![("frame", index as f64), ("frame_time_s", frame.time_s)];
-        let outcome = match fit.frame(recording, index) {
+        let ended = match fit.frame(recording, index) {
             Ok(estimate) => {
                 let (steps, factorisations) = (estimate.iterations.len(), fit.work().linear.factorisations - before);
                 said = format!(
@@ -95,57 +159,52 @@ pub(super) fn fit(
                     ("steps", steps as f64),
                     ("factorisations", factorisations as f64),
                 ]);
-                let saved = if smoothed {
+                if smoothed {
                     passed.push(Some(estimate.clone()));
-                    SavedFrame { estimate, error: None, unestimated: None, help: None }
+                    Ended::Waits(Box::new(estimate))
                 } else {
-                    book.frame(estimate, &fit, Beside::Fresh(&fit), &mut meter, flags)?
-                };
-                SavedOutcome::Fitted(Box::new(saved))
+                    Ended::Fitted(Box::new(book.frame(estimate, fit, Beside::Fresh(fit))?))
+                }
             }
             Err(error) => {
-                meter.fail(&error, flags);
                 said = format!("t {:.3} s: failed", frame.time_s);
                 passed.push(None);
-                let failed = FailedFrame::new(index, &error);
-                book.tally.failed.push(failed.clone());
-                SavedOutcome::Failed(failed)
+                book.tally.failed.push(FailedFrame::new(index, &error));
+                Ended::Failed(error)
             }
         };
-        let start = Instant::now();
-        checkpoints.save(at, &outcome, &Carried { fit: fit.memory(), halved: book.estimates.tangent_states() })?;
-        run.write_running(&book.tally)?;
-        book.record.wrote_since(start);
-        meter.frame(&said, &numbers);
+        let carried = Carried { fit: fit.memory(), halved: book.estimates.tangent_states() };
+        let status = book.tally.running();
+        writer.write(move |desk| {
+            let outcome = ended.write(frame, desk, flags)?;
+            checkpoints.save(at, &outcome, &carried)?;
+            status.write(&run.folder)?;
+            desk.meter.frame(&said, &numbers);
+            Ok(())
+        })?;
     }
-    meter.finish();
-    if smoothed && !book.tally.interrupted {
-        smooth(&mut fit, recording, (frames, &passed), &mut book, run, (&mut meter, flags))?;
-    }
-    *work = fit.work();
-    let sought: Vec<&str> = fit.unknowns().iter().map(|k| book.labels[*k].as_str()).collect();
-    if !book.heads.is_empty() {
-        write_free_head(&run.folder, &sought, &free_heads(&book.heads, registration, recording))?;
-    }
-    book.finish(scene, (&fit, registration), work, run, (&mut meter, flags))
+    Ok(passed)
 }
 
-/// Smooths the clip and writes its frames; those of the pass before where that fails.
-fn smooth(
+/// Smooths the clip and hands its frames over; those of the pass before where that fails.
+fn smooth<'a>(
     fit: &mut Fit<'_>,
-    recording: &Recording,
-    (frames, passed): (&[usize], &[Option<Estimate>]),
-    book: &mut Book<'_>,
-    run: &Run,
-    (meter, flags): (&mut Meter, &Flags),
+    (recording, frames): (&Recording, &[usize]),
+    passed: &[Option<Estimate>],
+    book: &mut Book<'a>,
+    writer: &mut Writer<'a>,
+    (run, flags): (&'a Run, &'a Flags),
 ) -> Result<()> {
-    let named = |at: usize| Frame { index: frames[at], time_s: recording.frames[frames[at]].time_s };
     if passed.iter().all(Option::is_none) {
         return Ok(());
     }
     let estimates = match fit.smooth(recording, frames, passed, &|| run.is_interrupted()) {
         Ok(Some(smoothed)) => {
-            meter.say(&format!("smoothed over {} frames in {} sweeps\n", frames.len(), smoothed.sweeps.len()));
+            let line = format!("smoothed over {} frames in {} sweeps\n", frames.len(), smoothed.sweeps.len());
+            writer.write(move |desk| {
+                desk.meter.say(&line);
+                Ok(())
+            })?;
             smoothed.frames.into_iter().map(Result::ok).collect()
         }
         Ok(None) => {
@@ -153,26 +212,17 @@ fn smooth(
             return Ok(());
         }
         Err(error) => {
-            meter.fail(&error, flags);
             book.tally.failed.push(FailedFrame::new(frames[0], &error));
+            writer.write(move |desk| {
+                desk.meter.fail(&error, flags);
+                Ok(())
+            })?;
             passed.to_vec()
         }
     };
-    for (at, estimate) in estimates.into_iter().enumerate() {
-        let Some(estimate) = estimate else { continue };
-        if estimate.bridged {
-            let warning = Warning {
-                code: "F012",
-                message: format!(
-                    "frame {} failed and is bridged: what stands there is what its neighbours say",
-                    frames[at]
-                ),
-                place: None,
-                help: None,
-            };
-            book.tally.warn(named(at), vec![warning], meter, flags);
-        }
-        book.frame(estimate, fit, Beside::Fresh(fit), meter, flags)?;
+    for estimate in estimates.into_iter().flatten() {
+        let entry = book.frame(estimate, fit, Beside::Fresh(fit))?;
+        writer.write(move |desk| entry.write(desk, flags))?;
     }
     Ok(())
 }

@@ -28,10 +28,12 @@ mod run;
 mod study;
 mod telling;
 mod terminal;
+mod writer;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use diagnostics::{Colour, render_error, render_warning};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -337,13 +339,16 @@ fn with_tip(mut error: clap::Error) -> clap::Error {
 
 /// Runs a command in a pool of its own, so that `--threads` holds for all parallel work.
 fn in_threads(cli: Cli) -> Result<Ending> {
-    let threads = cli.flags.threads.map_or(0, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| Error::Io {
+    thread_pool(cli.flags.threads.map_or(0, usize::from))?.install(|| dispatch(&cli))
+}
+
+/// So many threads; 0 are as many as there are cores.
+fn thread_pool(threads: usize) -> Result<ThreadPool> {
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| Error::Io {
         action: "start the threads of",
         path: "risorius".into(),
         source: std::io::Error::other(error),
-    })?;
-    pool.install(|| dispatch(&cli))
+    })
 }
 
 fn dispatch(cli: &Cli) -> Result<Ending> {

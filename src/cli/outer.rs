@@ -65,7 +65,7 @@ pub(super) fn settle(
     let lock = with.lock();
     run.folder.write("problem.lock.toml", &lock)?;
     let checkpoints = match checkpoints {
-        Some(_) => Some(Checkpoints::create(&run.folder, &Guard::new(&lock, run.inputs.clone()))?),
+        Some(_) => Some(Checkpoints::create(&run.folder, &Guard::new(&lock, run.manifest.inputs.clone()))?),
         None => None,
     };
     source.scene = with;

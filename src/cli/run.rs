@@ -9,9 +9,8 @@ use super::terminal::tell;
 use super::{Ending, Flags, fibres, fit, forward, more_about, outer, study};
 use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
-use crate::model::Model;
 use crate::report::html;
-use crate::report::manifest::Input;
+use crate::report::manifest::{Input, Numerics};
 use crate::report::state::{Checkpoints, Guard, Left};
 use crate::report::{FailedFrame, Frame, FrameWarning, Log, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
@@ -24,8 +23,8 @@ use std::time::Instant;
 pub(super) struct Run {
     pub folder: RunFolder,
     pub start: Instant,
-    /// Files that were read.
-    pub inputs: Vec<Input>,
+    /// What is run, on what.
+    pub manifest: Manifest,
     /// What came up before the first frame.
     pub noticed: Vec<(Frame, Warning)>,
     /// What it says, for `log.jsonl`.
@@ -44,17 +43,21 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Keeps what a frame gave notice of in an earlier process.
+    /// Keeps what a frame gave notice of.
     pub fn keep(&mut self, frame: Frame, warnings: &[Warning]) {
         self.warnings.extend(warnings.iter().map(|warning| FrameWarning::new(frame.index, warning)));
     }
 
     /// Shows what a frame gave notice of, and keeps it.
-    pub fn warn(&mut self, frame: Frame, warnings: Vec<Warning>, meter: &mut Meter, flags: &Flags) {
-        for warning in warnings {
-            meter.warn(&warning, flags);
-            self.warnings.push(FrameWarning::new(frame.index, &warning));
-        }
+    pub fn warn(&mut self, frame: Frame, warnings: Vec<Warning>, meter: &Meter, flags: &Flags) {
+        warnings.iter().for_each(|warning| meter.warn(warning, flags));
+        self.keep(frame, &warnings);
+    }
+
+    /// How the run stands, while it goes on.
+    pub fn running(&self) -> Status {
+        let warnings = self.warnings.clone();
+        Status { warnings, ..Status::running(self.frames_ok, self.failed.clone()) }
     }
 }
 
@@ -62,8 +65,9 @@ impl Run {
     /// That begins now; the log is kept in its folder.
     fn new(folder: RunFolder, inputs: Vec<Input>, log: Arc<Log>) -> Run {
         log.keep_in(&folder);
+        let manifest = Manifest::begun(std::env::args().collect(), inputs, rayon::current_num_threads());
         let (start, interrupted) = (Instant::now(), watch_interrupt());
-        Run { folder, start, inputs, noticed: Vec::new(), log, interrupted }
+        Run { folder, start, manifest, noticed: Vec::new(), log, interrupted }
     }
 
     /// That goes on in the folder of a run that began before.
@@ -74,19 +78,6 @@ impl Run {
     /// Whether Ctrl-C was pressed.
     pub fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
-    }
-
-    /// Writes how the run stands.
-    pub fn write_running(&self, tally: &Tally) -> Result<()> {
-        let warnings = tally.warnings.clone();
-        Status { warnings, ..Status::running(tally.frames_ok, tally.failed.clone()) }.write(&self.folder)
-    }
-
-    fn manifest(&self, model: Option<&Model>, work: &Work) -> Result<()> {
-        let command = std::env::args().collect();
-        let seconds = self.start.elapsed().as_secs_f64();
-        let threads = rayon::current_num_threads();
-        Manifest::now(command, self.inputs.clone(), threads, model, work, seconds).write(&self.folder)
     }
 }
 
@@ -133,7 +124,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
         Task::Forward => None,
     };
     let run = Run { start, ..Run::new(folder, inputs, log) };
-    run.write_running(&Tally::default())?;
+    Status::running(0, Vec::new()).write(&run.folder)?;
     solve(source, prepared, run, flags, (checkpoints, None))
 }
 
@@ -158,10 +149,12 @@ fn solve(
 ) -> Result<Ending> {
     let mut work = Work::default();
     let resumable = checkpoints.is_some();
-    let settled = match outer::settle(&mut source, prepared, checkpoints, &mut run, flags) {
+    run.manifest.numerics = Some(Numerics::of(&prepared.built.model));
+    let begun = run.manifest.write(&run.folder);
+    let settled = match begun.and_then(|()| outer::settle(&mut source, prepared, checkpoints, &mut run, flags)) {
         Ok(settled) => settled,
         Err(error) => {
-            let ending = finish(&run, None, &work, Err(error), flags);
+            let ending = finish(&run, &work, Err(error), flags);
             if resumable {
                 tell_resume(&ending, run.folder.path());
             }
@@ -175,7 +168,7 @@ fn solve(
             task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work)
         }),
     };
-    let ending = finish(&run, Some(&prepared.built.model), &work, outcome, flags);
+    let ending = finish(&run, &work, outcome, flags);
     if resumable {
         tell_resume(&ending, run.folder.path());
     }
@@ -211,19 +204,14 @@ pub(super) fn begin(name: &str, files: &[&Path], log: Arc<Log>, flags: &Flags) -
     let inputs = files.iter().map(|path| Input::read(path)).collect::<Result<_>>()?;
     let folder = run_folder(name, flags)?;
     let run = Run::new(folder, inputs, log);
-    run.write_running(&Tally::default())?;
+    Status::running(0, Vec::new()).write(&run.folder)?;
+    run.manifest.write(&run.folder)?;
     Ok(run)
 }
 
 /// Writes status and manifest whatever happened, and says how the command ends.
-pub(super) fn finish(
-    run: &Run,
-    model: Option<&Model>,
-    work: &Work,
-    outcome: Result<Tally>,
-    flags: &Flags,
-) -> Result<Ending> {
-    let manifest = run.manifest(model, work);
+pub(super) fn finish(run: &Run, work: &Work, outcome: Result<Tally>, flags: &Flags) -> Result<Ending> {
+    let manifest = run.manifest.clone().ended(work, run.start.elapsed().as_secs_f64()).write(&run.folder);
     // the first error is the one to tell
     let ended = outcome.and_then(|tally| manifest.and_then(|()| conclude(run, tally, flags)));
     if let Err(error) = &ended {

@@ -33,7 +33,7 @@ pub(super) fn run(study: &Study, path: &Path, flags: &Flags) -> Result<Ending> {
         let frames_ok = outcome.variants.iter().filter(|v| v.ending.is_ok()).count();
         Ok(Tally { frames_ok, interrupted: outcome.interrupted, ..Tally::default() })
     });
-    finish(&run, None, &work, tally, flags)
+    finish(&run, &work, tally, flags)
 }
 
 /// Every variant with its size and cost.

@@ -2,11 +2,11 @@
 
 use crate::error::{Result, Warning};
 use crate::fit::advise::{MarkerHelp, View, candidates};
-use crate::fit::identifiability::{ClipKnowledge, Evidence, Pair};
+use crate::fit::identifiability::{ClipKnowledge, Evidence, Pair, Told};
 use crate::fit::{Estimate, Fit};
 use crate::math::tensor::{Vector, norm, subtract};
 use crate::mesh::{MaterialPoint, Mesh};
-use crate::report::{Frame, Record};
+use crate::report::Frame;
 
 /// A marker is not proposed nearer than this to another, mm.
 pub(super) const APART_MM: f64 = 5.0;
@@ -20,9 +20,8 @@ const NAMED: usize = 3;
 /// The frames so far.
 pub(super) struct Telling {
     pub clip: ClipKnowledge,
-    /// Names of all controls, with units, and of all markers.
-    pub controls: Vec<String>,
-    pub markers: Vec<String>,
+    /// Names of all controls, with units.
+    controls: Vec<String>,
     points: Vec<MaterialPoint>,
     positions: Vec<Vector>,
     taken: Vec<Vector>,
@@ -36,7 +35,6 @@ impl Telling {
         Telling {
             clip: ClipKnowledge::default(),
             controls,
-            markers: fit.markers().iter().map(|m| m.name.clone()).collect(),
             positions: points.iter().map(|p| mesh.position(*p)).collect(),
             points,
             taken: fit.markers().iter().map(|m| mesh.position(m.point)).collect(),
@@ -44,8 +42,9 @@ impl Telling {
         }
     }
 
-    /// Adds a frame and writes its rows; `biases` one per control that is sought, or none. The marker that would help is sought
-    /// where the frame is the one that `fit` ended with (`live`), and otherwise known.
+    /// Adds a frame; gives back what its markers tell, if that is known, and the marker that would help, if its pair is the worst so
+    /// far. `biases` are one per control that is sought, or none. The marker is sought where the frame is the one that `fit`
+    /// ended with (`live`), and otherwise known.
     pub fn frame(
         &mut self,
         frame: Frame,
@@ -53,22 +52,20 @@ impl Telling {
         fit: &Fit<'_>,
         (live, known): (bool, Option<MarkerHelp>),
         biases: &[Option<f64>],
-        record: &mut Record<'_>,
-    ) -> Result<Option<MarkerHelp>> {
-        let Some(evidence) = Evidence::of(estimate, fit.controls(), fit.unknowns()) else { return Ok(None) };
+    ) -> Result<(Option<Told>, Option<MarkerHelp>)> {
+        let Some(evidence) = Evidence::of(estimate, fit.controls(), fit.unknowns()) else { return Ok((None, None)) };
         let measured: Vec<bool> = estimate.measured_mm.iter().map(Option::is_some).collect();
         let told = evidence.told(fit.markers(), &measured)?;
-        record.told(frame, &told, (&self.controls, &self.markers), biases)?;
         self.clip.add(frame.index, &evidence, &told, biases);
         if let Some(pair) = told.pairs.first() {
             let left = |pair: &Pair| 1.0 - pair.correlation.abs();
             if self.worst.as_ref().is_none_or(|(_, worst, _)| left(pair) < WORSE * left(worst)) {
                 let help = if live { self.help(pair, &evidence, estimate, fit) } else { known };
                 self.worst = Some((frame, pair.clone(), help));
-                return Ok(help);
+                return Ok((Some(told), help));
             }
         }
-        Ok(None)
+        Ok((Some(told), None))
     }
 
     /// The marker that tells the less certain of a pair best.

@@ -37,9 +37,7 @@ pub fn text(model: &Model, state: &State, common: &Common) -> String {
     let x = model.current(state);
     let [coordinates, deformed] = FIELDS;
     let fields = [(coordinates, mesh.parameters.as_slice()), (deformed, x.as_slice())];
-    let (host, muscles) =
-        rayon::join(|| write_mesh_with(mesh, &fields, &common.elements), || points(model, state, &x, common));
-    host + &muscles
+    write_mesh_with(mesh, &fields, &common.elements) + &points(model, state, &x, common)
 }
 
 /// The region of the muscles, whose host has the parameters `x`; nothing without muscles.

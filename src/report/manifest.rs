@@ -3,15 +3,17 @@
 use super::machine;
 use super::run_folder::{RunFolder, failed};
 use super::status::write_json;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::forward::Work;
 use crate::model::Model;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// The contents of `manifest.json`. What is not known is `null`.
+/// The contents of `manifest.json`, written when a run begins and again when it ends. What is not known, or not yet, is `null`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Manifest {
     /// Version of this crate.
@@ -29,9 +31,9 @@ pub struct Manifest {
     /// Size of the problem.
     pub numerics: Option<Numerics>,
     /// Work done.
-    pub work: WorkDone,
+    pub work: Option<WorkDone>,
     /// Wall time of the run, s.
-    pub wall_seconds: f64,
+    pub wall_seconds: Option<f64>,
     /// Processor time of all threads, s.
     pub cpu_seconds: Option<f64>,
     /// Greatest memory held, bytes.
@@ -61,12 +63,14 @@ pub struct Host {
 }
 
 /// Size of the discrete problem.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Numerics {
     /// Elements of the host.
     pub elements: usize,
     /// Its nodes.
     pub nodes: usize,
+    /// Muscles in it.
+    pub muscles: usize,
     /// Unknowns of the linear system, pressures included.
     pub unknowns: usize,
     /// Pressures among them.
@@ -107,15 +111,8 @@ pub struct WorkDone {
 }
 
 impl Manifest {
-    /// Of this process as it is now; `wall_seconds` since the run began.
-    pub fn now(
-        command: Vec<String>,
-        inputs: Vec<Input>,
-        threads: usize,
-        model: Option<&Model>,
-        work: &Work,
-        wall_seconds: f64,
-    ) -> Manifest {
+    /// Of a run that begins.
+    pub fn begun(command: Vec<String>, inputs: Vec<Input>, threads: usize) -> Manifest {
         Manifest {
             version: env!("CARGO_PKG_VERSION"),
             git: option_env!("RISORIUS_GIT"),
@@ -123,18 +120,43 @@ impl Manifest {
             inputs,
             threads,
             host: Host { os: std::env::consts::OS, arch: std::env::consts::ARCH, cpu: machine::cpu_name() },
-            numerics: model.map(Numerics::of),
-            work: WorkDone::from(work),
-            wall_seconds,
+            numerics: None,
+            work: None,
+            wall_seconds: None,
+            cpu_seconds: None,
+            peak_memory_bytes: None,
+        }
+    }
+
+    /// Of the run when it ends, in this process; `wall_seconds` since it began.
+    pub fn ended(self, work: &Work, wall_seconds: f64) -> Manifest {
+        Manifest {
+            work: Some(WorkDone::from(work)),
+            wall_seconds: Some(wall_seconds),
             cpu_seconds: machine::cpu_seconds(),
             peak_memory_bytes: machine::peak_memory_bytes(),
+            ..self
+        }
+    }
+
+    /// That of a run as it stands; null where there is none.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::DamagedRun`].
+    pub fn read(run: &Path) -> Result<Value> {
+        let path = run.join("manifest.json");
+        match std::fs::read(&path) {
+            Ok(bytes) => serde_json::from_slice(&bytes)
+                .map_err(|error| Error::DamagedRun { path, message: error.to_string().into() }),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(Value::Null),
+            Err(source) => Err(Error::Io { action: "read", path, source }),
         }
     }
 
     /// Writes `manifest.json`, atomically.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io).
+    /// [`Error::Io`].
     pub fn write(&self, run: &RunFolder) -> Result<()> {
         write_json(run, "manifest.json", self)
     }
@@ -144,7 +166,7 @@ impl Input {
     /// Reads a file for its length and hash.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io).
+    /// [`Error::Io`].
     pub fn read(path: &Path) -> Result<Input> {
         let mut file = File::open(path).map_err(failed("read", path))?;
         let mut hash = Sha256::new();
@@ -160,6 +182,7 @@ impl Numerics {
         Numerics {
             elements: model.mesh().elements(),
             nodes: model.mesh().nodes,
+            muscles: model.muscles().count(),
             unknowns: model.numbering().unknowns(),
             pressures: model.numbering().pressures(),
             tangent_entries: model.symbolic().pattern().nnz(),

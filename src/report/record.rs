@@ -7,7 +7,8 @@ use super::frame::{
 use super::run_folder::RunFolder;
 use super::tables::{
     ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
-    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, ProbeTable, storage, write_cost,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, OutputSeconds, ProbeTable,
+    storage, write_cost,
 };
 use super::view::View;
 use crate::error::Result;
@@ -39,8 +40,7 @@ pub struct Record<'a> {
     activity: Vec<(f64, Vec<f64>)>,
     view: View,
     frames: usize,
-    /// Time spent in writing, s.
-    seconds: f64,
+    seconds: OutputSeconds,
 }
 
 impl<'a> Record<'a> {
@@ -82,7 +82,7 @@ impl<'a> Record<'a> {
             activity: Vec::new(),
             view: View::new(run),
             frames: 0,
-            seconds: 0.0,
+            seconds: OutputSeconds::default(),
         })
     }
 
@@ -97,7 +97,6 @@ impl<'a> Record<'a> {
         markers: &[MarkerPair<'_>],
         iterations: &[FitIteration],
     ) -> Result<()> {
-        let start = Instant::now();
         let state = &equilibrium.state;
         let contacts = contact_points(self.model, state);
         self.energies.add(frame, self.model, equilibrium)?;
@@ -122,7 +121,6 @@ impl<'a> Record<'a> {
             self.view.add(frame, self.model, state, markers, &contacts)?;
         }
         self.frames += 1;
-        self.seconds += start.elapsed().as_secs_f64();
         Ok(())
     }
 
@@ -199,13 +197,18 @@ impl<'a> Record<'a> {
         Ok([write("last_good", &failure.last_good)?, write("failed", &failure.failed)?])
     }
 
-    /// Counts writing that others began at `start`: checkpoints and the status.
+    /// Counts what was written since `start`.
     pub fn wrote_since(&mut self, start: Instant) {
-        self.seconds += start.elapsed().as_secs_f64();
+        self.seconds.written += start.elapsed().as_secs_f64();
     }
 
-    /// Time spent in writing so far, s.
-    pub fn seconds(&self) -> f64 {
+    /// Counts for how long solving waited, s.
+    pub fn waited(&mut self, seconds: f64) {
+        self.seconds.waited += seconds;
+    }
+
+    /// What writing took so far.
+    pub fn seconds(&self) -> OutputSeconds {
         self.seconds
     }
 

@@ -51,7 +51,7 @@ impl View {
     }
 
     /// Adds a frame: the exact shape (also as an EX file), the resampled one, the muscles if the model has any, the markers and
-    /// the points of contacts if there are any. The files are made side by side: the solver waits for them.
+    /// the points of contacts if there are any.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io).
@@ -63,30 +63,22 @@ impl View {
         markers: &[MarkerPair<'_>],
         contacts: &[Vec<ContactPoint>],
     ) -> Result<()> {
-        let View { folder, common, shape, linear, muscles, contact, markers: shown, residuals: apart } = self;
         let time_s = frame.time_s;
-        let exf = || {
-            let common = common.get_or_insert_with(|| exf::Common::new(model));
-            exf::write(&folder.join(format!("result_{:04}.exf", frame.index)), model, state, common)
-        };
-        let shape = || shape.add(frame, &bezier::shape(model, state, time_s));
-        let linear = || linear.add(frame, &linear::shape(model, state, time_s));
-        let points = || {
-            if model.muscles().next().is_some() {
-                muscles.add(frame, &muscles::points(model, state, time_s))?;
-            }
-            if !contacts.is_empty() {
-                contact.add(frame, &contact::points(contacts, time_s))?;
-            }
-            if !markers.is_empty() {
-                shown.add(frame, &markers::points(markers, time_s))?;
-                apart.add(frame, &residuals::lines(markers, time_s))?;
-            }
-            Ok(())
-        };
-        let ((exf, shape), (linear, points)) =
-            rayon::join(|| rayon::join(exf, shape), || rayon::join(linear, points));
-        exf.and(shape).and(linear).and(points)
+        let common = self.common.get_or_insert_with(|| exf::Common::new(model));
+        exf::write(&self.folder.join(format!("result_{:04}.exf", frame.index)), model, state, common)?;
+        self.shape.add(frame, &bezier::shape(model, state, time_s))?;
+        self.linear.add(frame, &linear::shape(model, state, time_s))?;
+        if model.muscles().next().is_some() {
+            self.muscles.add(frame, &muscles::points(model, state, time_s))?;
+        }
+        if !contacts.is_empty() {
+            self.contact.add(frame, &contact::points(contacts, time_s))?;
+        }
+        if !markers.is_empty() {
+            self.markers.add(frame, &markers::points(markers, time_s))?;
+            self.residuals.add(frame, &residuals::lines(markers, time_s))?;
+        }
+        Ok(())
     }
 
     /// Writes a state beside the frames, for example the iterate at which one failed, as `<name>.vtu`; returns its path.

@@ -1,4 +1,4 @@
-//! What others open. FAMILY: each format in a file of its own, made from a [`Playback`], or from the tables alone.
+//! What others open. FAMILY: each format in a file of its own, made from a [`Playback`], or from tables and files as they are.
 
 pub mod exf;
 pub mod glb;
@@ -11,7 +11,7 @@ pub mod ply;
 pub mod sto;
 pub mod vtu;
 
-use super::playback::{Playback, Shape};
+use super::playback::{Activity, Playback, Shape};
 use super::run_folder::{failed, write_atomically};
 use crate::error::{Error, Result, Warning};
 use std::path::{Path, PathBuf};
@@ -76,12 +76,18 @@ impl Exported {
 pub fn export(run: &Path, formats: &[Format], frame: Option<usize>, folder: &Path) -> Result<Exported> {
     std::fs::create_dir_all(folder).map_err(failed("create", folder))?;
     let mut done = Exported::default();
-    // tables are there whatever the task, and no shape need be read for them
-    let (of_tables, of_shapes): (Vec<Format>, Vec<Format>) =
-        formats.iter().partition(|format| **format == Format::Parquet);
-    if !of_tables.is_empty() {
-        parquet::write(run, folder, &mut done)?;
+    let mut of_shapes = Vec::new();
+    for format in formats {
+        match format {
+            Format::Sto => done.write(folder.join("activations.sto"), sto::text(&Activity::read(run)?))?,
+            Format::Exf => exf::copy(&Activity::read(run)?, folder, &mut done)?,
+            Format::Vtu => vtu::copy(&Activity::read(run)?, folder, &mut done)?,
+            // tables are there whatever the task
+            Format::Parquet => parquet::write(run, folder, &mut done)?,
+            Format::Glb | Format::Mcap | Format::Obj | Format::Ply => of_shapes.push(*format),
+        }
     }
+    // reading shapes takes nearly all of the time: once, and only for what is made from them
     if !of_shapes.is_empty() {
         show(&Playback::read(run)?, &of_shapes, frame, folder, &mut done)?;
     }
@@ -94,8 +100,6 @@ fn show(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path,
         match format {
             Format::Glb => done.write(folder.join("result.glb"), glb::file(run)?)?,
             Format::Mcap => mcap::write(run, folder, done)?,
-            Format::Sto => done.write(folder.join("activations.sto"), sto::text(run))?,
-            Format::Exf => exf::copy(run, folder, done)?,
             Format::Obj => {
                 let shape = chosen(run, frame)?;
                 done.write(folder.join(format!("frame_{:04}.obj", shape.frame.index)), obj::text(run, shape))?;
@@ -104,8 +108,7 @@ fn show(run: &Playback, formats: &[Format], frame: Option<usize>, folder: &Path,
                 let shape = chosen(run, frame)?;
                 done.write(folder.join(format!("frame_{:04}.ply", shape.frame.index)), ply::file(run, shape))?;
             }
-            Format::Vtu => vtu::copy(run, folder, done)?,
-            Format::Parquet => {}
+            Format::Sto | Format::Exf | Format::Vtu | Format::Parquet => {}
         }
     }
     Ok(())

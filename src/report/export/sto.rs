@@ -1,15 +1,15 @@
 //! Activations for OpenSim.
 
-use crate::report::playback::Playback;
+use crate::report::Frame;
+use crate::report::playback::Activity;
 use crate::report::tables::storage;
 use crate::scene::ControlKind;
 
 /// The text of the file. Poses of bones are not in it: to OpenSim they are coordinates of another model.
-pub fn text(run: &Playback) -> String {
+pub fn text(run: &Activity) -> String {
     let columns: Vec<_> = run.controls.iter().filter(|control| control.kind == ControlKind::Activation).collect();
     let rows = run.frames.iter().enumerate();
-    let row = |(row, frame): (usize, &crate::report::Frame)| {
-        (frame.time_s, columns.iter().map(|control| control.values[row]).collect())
-    };
+    let row =
+        |(row, frame): (usize, &Frame)| (frame.time_s, columns.iter().map(|control| control.values[row]).collect());
     storage(columns.iter().map(|control| control.name.as_str()), rows.map(row))
 }

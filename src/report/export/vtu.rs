@@ -2,7 +2,7 @@
 
 use super::Exported;
 use crate::error::Result;
-use crate::report::playback::Playback;
+use crate::report::playback::Activity;
 use crate::report::run_folder::failed;
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use std::path::Path;
 const ENDS: [&str; 3] = [".vtu", ".pvd", ".vtu.series"];
 
 /// Copies `view/*` and `view/linear/*` but for the EX files.
-pub fn copy(run: &Playback, folder: &Path, done: &mut Exported) -> Result<()> {
+pub fn copy(run: &Activity, folder: &Path, done: &mut Exported) -> Result<()> {
     run.shown()?;
     for part in ["", "linear"] {
         let (from, to) = (run.folder.join("view").join(part), folder.join(part));

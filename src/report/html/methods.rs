@@ -1,7 +1,6 @@
 //! What was done, in a paragraph that can be copied, and from what.
 
 use super::frame::{escape, table};
-use crate::error::{Error, Result};
 use crate::report::playback::Playback;
 use crate::scene::{GeometrySpec, LawSpec, SensitivitySpec};
 use serde_json::Value;
@@ -76,21 +75,6 @@ pub(super) fn paragraph(run: &Playback, manifest: &Value) -> String {
          Pinsky, Delp 2005, Journal of Biomechanics 38, 657-665.</p>",
         escape(&text)
     )
-}
-
-/// `manifest.json` as it stands.
-///
-/// # Errors
-/// [`Error::Io`], [`Error::DamagedRun`].
-pub(super) fn manifest(run: &Playback) -> Result<Value> {
-    let path = run.folder.join("manifest.json");
-    match std::fs::read(&path) {
-        Ok(bytes) => {
-            serde_json::from_slice(&bytes).map_err(|e| Error::DamagedRun { path, message: e.to_string().into() })
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Value::Null),
-        Err(source) => Err(Error::Io { action: "read", path, source }),
-    }
 }
 
 /// From what and with what it was made.

@@ -5,6 +5,7 @@ use super::frame::{Page, escape, table};
 use super::{methods, sides, told, viewer};
 use crate::error::Result;
 use crate::math::tensor::{dot, norm, subtract};
+use crate::report::Manifest;
 use crate::report::playback::{Control, Marker, Playback, Sheet};
 use crate::report::status::{Outcome, Status};
 
@@ -35,7 +36,7 @@ pub(super) fn page(run: &Playback) -> Result<String> {
         page.section("What the markers can and cannot tell", &section);
     }
     page.section("Convergence and cost", &effort(run)?);
-    let manifest = methods::manifest(run)?;
+    let manifest = Manifest::read(&run.folder)?;
     page.section("Methods", &methods::paragraph(run, &manifest));
     page.section("Provenance", &methods::provenance(run, &manifest));
     Ok(page.html())
@@ -213,7 +214,8 @@ fn effort(run: &Playback) -> Result<String> {
             );
         }
         html += &table(["part", "seconds", "clock", "count"], &rows);
-        html += "<p class=\"note\">Seconds of effects are summed over threads and are part of the assembly; those of stages are wall time.</p>";
+        html += "<p class=\"note\">Seconds of effects are summed over threads and are part of the assembly; those of stages are wall time. Output: \
+                 solving waited for files; most of writing goes on beside it.</p>";
     }
     Ok(html)
 }

@@ -2,9 +2,11 @@
 
 use super::{sheets, status};
 use crate::error::Result;
+use crate::report::Manifest;
 use crate::report::export::Format;
+use crate::report::manifest::Numerics;
 use crate::report::status::Status;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -17,6 +19,8 @@ pub struct Contents {
     /// How the run ended.
     #[serde(flatten)]
     pub status: Status,
+    /// Size of the problem; `None` where the task has no model, or it was not known yet.
+    pub numerics: Option<Numerics>,
     /// First and last time, s; `None` without frames.
     pub time_s: Option<[f64; 2]>,
     /// Of every control its least and greatest value, and the frame of the latter.
@@ -61,6 +65,7 @@ impl Contents {
     /// [`Error::Io`](crate::Error::Io).
     pub fn of(folder: &Path) -> Result<Contents> {
         let status = status(folder)?;
+        let numerics = Numerics::deserialize(&Manifest::read(folder)?["numerics"]).ok();
         let tables = sheets(folder)?;
         let (mut time_s, mut controls, mut markers) = (None, BTreeMap::new(), BTreeMap::new());
         if let Some(sheet) = tables.get("activations").filter(|sheet| !sheet.is_empty()) {
@@ -99,6 +104,7 @@ impl Contents {
         Ok(Contents {
             path: folder.into(),
             status,
+            numerics,
             time_s,
             controls,
             markers,
@@ -139,6 +145,9 @@ impl fmt::Display for Contents {
         let word = serde_json::to_value(status).ok().and_then(|word| word.as_str().map(str::to_owned));
         write!(out, "{}: {}", self.path.display(), word.unwrap_or_default())?;
         writeln!(out, ", {frames_ok} frames, {:.1} MB", self.bytes as f64 / 1e6)?;
+        if let Some(Numerics { elements, nodes, muscles, unknowns, .. }) = self.numerics {
+            writeln!(out, "model: {elements} elements, {nodes} nodes, {unknowns} unknowns, {muscles} muscles")?;
+        }
         if let Some([first, last]) = self.time_s {
             writeln!(out, "time: {first:.3} to {last:.3} s")?;
         }

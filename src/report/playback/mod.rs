@@ -1,12 +1,14 @@
 //! A finished run read back from its folder: what moved, what was measured, what was found. Nothing is solved again: the
 //! nodal parameters in `view/result_<frame>.exf` are exact.
 
+mod activity;
 pub mod body;
 pub mod contents;
 pub mod facets;
 pub mod sheet;
 mod tracks;
 
+pub use activity::Activity;
 pub use body::Body;
 pub use contents::Contents;
 pub use sheet::Sheet;
@@ -74,23 +76,14 @@ impl Playback {
     /// # Errors
     /// [`Error::NotARun`] for another folder, or the run of a study or of fibres; [`Error::DamagedRun`]; [`Error::Io`].
     pub fn read(folder: &Path) -> Result<Playback> {
-        let status = status(folder)?;
-        let path = folder.join("problem.lock.toml");
-        let lock = std::fs::read_to_string(&path).map_err(|_| not_a_run(folder, "problem.lock.toml"))?;
-        let (scene, lost_recording) = problem(folder, &path)?;
+        let activity = Activity::read(folder)?;
+        let kept = activity.kept();
+        let Activity { folder, scene, lost_recording, lock, status, frames, controls } = activity;
         let tables = folder.join("tables");
-        let activations =
-            Sheet::find(&tables, "activations")?.ok_or_else(|| not_a_run(folder, "tables/activations.csv"))?;
-        let frames = tracks::frames(&activations)?;
-        if frames.len() < status.frames_ok {
-            let message = format!("it has {} rows, status.json counts {} frames", frames.len(), status.frames_ok);
-            return Err(activations.damaged(message));
-        }
-        let controls = tracks::controls(&activations, &scene, &tables)?;
         let markers =
             Sheet::find(&tables, "markers")?.map_or(Ok(Vec::new()), |sheet| tracks::markers(&sheet, &frames))?;
         if scene.fit.is_some() && scene.task == Task::Fit && markers.is_empty() && !frames.is_empty() {
-            return Err(not_a_run(folder, "tables/markers.csv"));
+            return Err(not_a_run(&folder, "tables/markers.csv"));
         }
         let convergence = Sheet::find(&tables, "convergence")?;
         let effort = convergence.map_or(Ok(Vec::new()), |sheet| tracks::effort(&sheet, &frames))?;
@@ -101,11 +94,6 @@ impl Playback {
         let muscles: Vec<Body> =
             scene.muscles.par_iter().map(|spec| Body::muscle(spec, &locator)).collect::<Result<_>>()?;
         drop(locator);
-        let kept: Vec<(Frame, PathBuf)> = frames
-            .iter()
-            .map(|frame| (*frame, folder.join(format!("view/result_{:04}.exf", frame.index))))
-            .filter(|(_, path)| path.is_file())
-            .collect();
         if let Some((_, path)) = kept.first() {
             same_mesh(path, &host)?;
         }
@@ -115,7 +103,6 @@ impl Playback {
             Ok(Shape { frame: *frame, skin: skin.points(&deformed), muscles })
         };
         let shapes = kept.par_iter().map(shape).collect::<Result<_>>()?;
-        let folder = folder.to_path_buf();
         Ok(Playback {
             folder,
             scene,

@@ -6,10 +6,20 @@ use crate::forward::Work;
 use crate::model::Model;
 use crate::report::run_folder::RunFolder;
 
+/// What tables, shapes and checkpoints of frames took, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OutputSeconds {
+    /// For so long solving waited for them.
+    pub waited: f64,
+    /// So long it took to write them, most of it while the next frame was solved.
+    pub written: f64,
+}
+
 /// Writes the table `part,seconds,clock,points,count,flops`: a row per effect that the scene named (seconds summed over
 /// `threads`, quadrature points evaluated), then rows on the `wall` clock for `assembly` (evaluations, which hold the
-/// effects, and assemblies), `factorisation`, `solve` and `output`, and for `estimate`, the whole of what estimates of the error took, if
-/// there were any: its work and seconds.
+/// effects, and assemblies), `factorisation`, `solve` and `output` (solving waited for files), one on the clock of the `writer`, a
+/// thread beside the solver, for `writing`, and one for `estimate`, the whole of what estimates of the error took, if there
+/// were any: its work and seconds.
 ///
 /// # Errors
 /// [`Error::Io`](crate::Error::Io).
@@ -17,7 +27,7 @@ pub fn write_cost(
     run: &RunFolder,
     model: &Model,
     work: &Work,
-    output_seconds: f64,
+    output: OutputSeconds,
     estimate: Option<(&Work, f64)>,
 ) -> Result<()> {
     let mut rows = Rows::default();
@@ -35,7 +45,9 @@ pub fn write_cost(
     let (count, flops) = (linear.factorisations.into(), linear.factor_flops.into());
     wall("factorisation", linear.factor_time.as_secs_f64(), count, flops);
     wall("solve", linear.solve_time.as_secs_f64(), linear.solves.into(), Cell::Empty);
-    wall("output", output_seconds, Cell::Empty, Cell::Empty);
+    wall("output", output.waited, Cell::Empty, Cell::Empty);
+    let writing = [output.written.into(), "writer".into()].into_iter().chain([const { Cell::Empty }; 3]);
+    rows.add(["writing".into()].into_iter().chain(writing));
     if let Some((work, seconds)) = estimate {
         let (points, count) = (work.points.iter().sum::<usize>(), work.linear.factorisations);
         let cost = [seconds.into(), "wall".into(), points.into(), count.into(), work.linear.factor_flops.into()];
