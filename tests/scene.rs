@@ -532,6 +532,17 @@ fn regions_and_points_must_lie_in_the_host() {
     }
 }
 
+/// A message gives the nearest material point to three places; a point that is typed so is on the surface.
+#[test]
+fn a_point_that_is_rounded_to_the_outside_is_on_the_surface() {
+    let at = |y: &str| {
+        let text = OTHERS.replacen("position_mm = [10, 0.5, 1]", &format!("position_mm = [10, 0.5, {y}]"), 1);
+        risorius::model::build::build(&parse(&text, &[]).unwrap())
+    };
+    assert!(at("1.0005").is_ok());
+    assert_eq!(at("1.002").err().expect("it is outside").mistakes()[0].code(), "G020");
+}
+
 const CONTACTS: &str = r#"
 [[sliding]]
 face = "xi3=0"

@@ -15,7 +15,7 @@ use crate::mesh::face::{Face, boundary_faces};
 use crate::mesh::facial;
 use crate::mesh::fibre_angles::FibreAngles;
 use crate::mesh::join::join;
-use crate::mesh::location::Locator;
+use crate::mesh::location::{Locator, Outside};
 use crate::mesh::{MaterialPoint, Mesh};
 use crate::scene::{
     ActivationSpec, BlockSpec, ContactLawSpec, ContactSpec, ControlValue, ElementSpec, FaceMeshSpec, FaceMuscleSpec,
@@ -48,6 +48,9 @@ pub struct Built {
 
 /// Quadrature points that a muscle should have along a host element in each direction.
 const POINTS_PER_HOST_ELEMENT: f64 = 2.0;
+/// Coordinates that are typed, or copied from a message, are rounded: a point that is no farther than this outside, mm, is on the
+/// surface.
+const ROUNDED: f64 = 1e-3;
 
 /// Builds the model of a scene.
 ///
@@ -90,7 +93,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     }
     let bones = bones(scene, &mut controls);
     let point = |position: [f64; 3], what: &'static str, place: &Place| {
-        locator.locate(position).map_err(|outside| Error::PointOutside {
+        material_point(&locator, position).map_err(|outside| Error::PointOutside {
             what,
             distance: outside.distance,
             nearest: mesh.position(outside.nearest),
@@ -145,7 +148,7 @@ pub fn build(scene: &Scene) -> Result<Built> {
     terms.extend(attachments(&mesh, &bones, &tied, element_size, shear_modulus, scene.solver.tolerance));
     let mut probes = Vec::new();
     for probe in &scene.probes {
-        match locator.locate(probe.position_mm) {
+        match material_point(&locator, probe.position_mm) {
             Ok(point) => probes.push(point),
             Err(outside) => mistakes.push(Error::ProbeOutside {
                 name: probe.name.as_str().into(),
@@ -281,6 +284,14 @@ pub fn muscle_mesh(spec: &MuscleSpec) -> Result<(Mesh, FibreAngles, Option<Warni
     let warning = file.and_then(|(_, geometry)| geometry.warning(&spec.place));
     let angles = turned(&mesh, angles, spec.fibre_turn_deg);
     Ok((mesh, angles, warning))
+}
+
+/// The point of the host at a position of the problem file.
+fn material_point(locator: &Locator, position: [f64; 3]) -> std::result::Result<MaterialPoint, Outside> {
+    locator.locate(position).or_else(|outside| match outside.distance <= ROUNDED {
+        true => Ok(outside.nearest),
+        false => Err(outside),
+    })
 }
 
 /// Embeds a muscle whose first control is `first`; gives the names of its controls and the warning of its mesh too.
