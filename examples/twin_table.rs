@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 
 const FRAMES: usize = 40;
 const CLIPS: u64 = 3;
+/// Neutral frames where they are several.
+const NEUTRAL: usize = 10;
 /// What the model that moves the markers has better where it is not the one that is fitted.
 const FINER: [&str; 3] = ["mesh.block.elements=[12, 4, 4]", "muscle.top.gauss=6", "muscle.bottom.gauss=6"];
 
@@ -26,9 +28,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, set, finer) in [("the mesh that is fitted", &[][..], false), ("12 x 4 x 4 elements", &FINER[..], true)]
     {
         let clean = positions(set, &truth);
-        for head in [Head::Bones, Head::Estimated] {
+        for (head, neutral) in [(Head::Bones, 1), (Head::Bones, NEUTRAL), (Head::Estimated, 1)] {
             for (noise_mm, lost) in [(0.1, 0.1), (0.3, 0.1), (0.3, 0.4)] {
-                let conditions = Conditions { noise_mm, lost, head };
+                let conditions = Conditions { noise_mm, lost, head, neutral };
                 let mut scores = [Score::default(); 2];
                 for seed in 1..=CLIPS {
                     let path = folder.path().join("clip.mcap");
@@ -44,7 +46,11 @@ fn main() -> Result<(), Box<dyn Error>> {
                     let row = format!(
                         "| {name} | {noise_mm} | {:.0} % | {} | {fitted} | {:.3} | {:.1e} | {} | {} | {} |\n",
                         100.0 * lost,
-                        if head == Head::Bones { "bone markers" } else { "estimated" },
+                        match head {
+                            Head::Bones if neutral > 1 => format!("bone markers, {neutral} neutral frames"),
+                            Head::Bones => "bone markers".into(),
+                            Head::Estimated => "estimated".into(),
+                        },
                         score.marker_rms(),
                         score.rms(),
                         unbiased[0],
