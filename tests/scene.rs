@@ -429,6 +429,17 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
         assert_eq!((content(&scene), &lock), (content(&again), &again.lock()));
         assert!(lock.contains("[fit.head]"), "{lock}");
     }
+    for (neutral, written) in [
+        ("{ last = 9 }", "neutral = { first = 0, last = 9, step = 1 }"),
+        ("{ first = 4, step = 2 }", "neutral = { first = 4, step = 2 }"),
+        ("{ first = 4, last = 4 }", "neutral = 4"),
+        ("\"first\"", "neutral = \"first\""),
+    ] {
+        let scene = parse(WHOLE, &[&format!("fit.neutral={neutral}")]).unwrap();
+        let lock = scene.lock();
+        assert!(lock.contains(written), "{written} is not in\n{lock}");
+        assert_eq!(content(&scene), content(&Scene::parse(&lock, "problem.lock.toml", Path::new("/"), &[]).unwrap()));
+    }
 }
 
 /// The laws, the regions and the loads that `WHOLE` does not have.
