@@ -35,7 +35,7 @@ fn scores(set: &[&str], conditions: &Conditions, clips: u64, estimate: bool) -> 
 /// 0.3 mm: of the intervals about 95 % hold the truth, and smoothing halves the error.
 #[test]
 fn intervals_hold_the_truth_and_smoothing_halves_the_error() {
-    let conditions = Conditions { noise_mm: 0.3, lost: 0.4, head: Head::Estimated };
+    let conditions = Conditions { noise_mm: 0.3, lost: 0.4, head: Head::Estimated, neutral: 1 };
     let [alone, smoothed] = scores(&[], &conditions, 2, false);
     assert_eq!((alone.frames(), smoothed.frames()), (2 * FRAMES, 2 * FRAMES));
     assert!((0.90..=0.99).contains(&alone.coverage()), "{}", alone.coverage());
@@ -46,8 +46,25 @@ fn intervals_hold_the_truth_and_smoothing_halves_the_error() {
 /// Bone markers as noisy as the others: the intervals hold their noise too.
 #[test]
 fn intervals_hold_the_noise_of_bone_markers() {
-    let conditions = Conditions { noise_mm: 0.3, lost: 0.1, head: Head::Bones };
+    let conditions = Conditions { noise_mm: 0.3, lost: 0.1, head: Head::Bones, neutral: 1 };
     let [alone, smoothed] = scores(&[], &conditions, 1, false);
+    for score in [alone, smoothed] {
+        assert!((0.88..=1.0).contains(&score.coverage()), "{}", score.coverage());
+    }
+}
+
+/// The noise of a single neutral frame turns the head of all frames alike, and smoothing leaves it; ten leave a third of it. Both
+/// together halve the error of single frames with a single neutral frame; smoothing alone does not.
+#[test]
+fn several_neutral_frames_take_away_what_smoothing_leaves() {
+    let one = Conditions { noise_mm: 0.3, lost: 0.1, head: Head::Bones, neutral: 1 };
+    let [alone_of_one, smoothed_of_one] = scores(&[], &one, 3, false);
+    let [alone, smoothed] = scores(&[], &Conditions { neutral: 10, ..one }, 3, false);
+    assert_eq!((alone.frames(), smoothed.frames()), (3 * FRAMES, 3 * FRAMES));
+    assert!(alone.rms() < 0.75 * alone_of_one.rms(), "{} of {}", alone.rms(), alone_of_one.rms());
+    assert!(smoothed.rms() < 0.6 * smoothed_of_one.rms(), "{} of {}", smoothed.rms(), smoothed_of_one.rms());
+    assert!(smoothed.rms() < 0.75 * alone.rms(), "{} of {}", smoothed.rms(), alone.rms());
+    assert!(smoothed.rms() < 0.5 * alone_of_one.rms(), "{} of {}", smoothed.rms(), alone_of_one.rms());
     for score in [alone, smoothed] {
         assert!((0.88..=1.0).contains(&score.coverage()), "{}", score.coverage());
     }
@@ -58,7 +75,7 @@ fn intervals_hold_the_noise_of_bone_markers() {
 #[test]
 fn the_estimate_explains_what_a_coarse_mesh_does() {
     let finer = ["mesh.block.elements=[8, 2, 2]", "muscle.top.gauss=6", "muscle.bottom.gauss=6"];
-    let conditions = Conditions { noise_mm: 0.05, lost: 0.1, head: Head::Bones };
+    let conditions = Conditions { noise_mm: 0.05, lost: 0.1, head: Head::Bones, neutral: 1 };
     let [alone, _] = scores(&finer, &conditions, 1, true);
     assert!(alone.coverage() < 0.9, "{}", alone.coverage());
     assert!(alone.rms_unbiased() < 0.5 * alone.rms(), "{} of {}", alone.rms_unbiased(), alone.rms());

@@ -292,6 +292,97 @@ fn offsets_of_markers_are_taken_out_as_far_as_the_neutral_frame_tells_them() {
     }
 }
 
+const BONES: &str =
+    "[fit.head]\nbone_markers = [\"forehead\", \"temple.L\", \"temple.R\", \"neck.L\", \"brow_mid.R\"]\n";
+
+/// A head that turns while the face is at rest: its frames are brought together, and their mean has less than half of the noise of one.
+#[test]
+fn neutral_frames_are_brought_together_and_averaged() {
+    let rest = markers(1.5);
+    let turned = |frame: usize| {
+        let part = 0.04 * frame as f64;
+        let head =
+            Motion { scale: 1.0, turn: rotation(normalised([0.3, -0.8, 0.5]), part), shift: [9.0 * part, 4.0, part] };
+        elsewhere().then(&head)
+    };
+    let film = || {
+        let frames: Vec<_> = (0..9).map(|k| moved(&noisy(&rest, 40 + k as u64), &turned(k))).collect();
+        let mut film = recording(&frames);
+        // a marker counts in the frames that show it
+        (1..4).for_each(|k| film.frames[k].positions_mm[3 + k] = None);
+        film
+    };
+    // bone markers, or the face as a whole
+    for head in [BONES, "[fit.head]\nestimate = true\n"] {
+        let rms = |neutral: &str| {
+            let (registration, warnings, found) =
+                registered(&rest, film(), &format!("{RIGID}{neutral}\n{head}")).unwrap();
+            assert!(warnings.is_empty(), "{warnings:?}");
+            (registration, found)
+        };
+        let (one, _) = rms("neutral = 0");
+        let (nine, found) = rms("neutral = { first = 0, last = 8 }");
+        println!("{head}{} and {} mm", one.rms_mm, nine.rms_mm);
+        assert!(nine.rms_mm < 0.5 * one.rms_mm, "{} and {} mm", one.rms_mm, nine.rms_mm);
+        assert_eq!((nine.neutral.len(), nine.markers.len()), (9, rest.len()));
+        assert!(nine.to_string().contains("the mean of its frames 0 to 8 fits the model"), "{nine}");
+        if let Some(bones) = found.bones {
+            assert_eq!(bones.neutral, (0..9).collect::<Vec<_>>());
+        }
+    }
+}
+
+/// What n neutral frames leave open of an offset s is s^2 e^2 / (s^2 + e^2) with e^2 = sd^2 / n, of each marker its own n.
+#[test]
+fn offsets_are_as_sure_as_the_neutral_frames_that_show_them_are_many() {
+    let places = markers(2.0);
+    let mut film = recording(&vec![places.clone(); 5]);
+    film.frames[2].positions_mm[1] = None;
+    (0..4).for_each(|k| film.frames[k].positions_mm[2] = None);
+    let (sd, s) = (0.3, 0.4);
+    let fit = format!("units = \"mm\"\nneutral = {{ first = 0, last = 3 }}\nsd_mm = {sd}\noffset_sd_mm = {s}\n");
+    let scene = Scene::parse(&problem(&places, &fit), "face.toml", Path::new("."), &[]).unwrap();
+    let mesh: Mesh = host(&scene.mesh).unwrap();
+    let placed = place(&scene, scene.fit.as_ref().unwrap(), &mesh, &film).unwrap();
+    for (marker, part) in [(0, 0.16 / (0.16 + 0.0225)), (1, 0.16 / (0.16 + 0.03)), (2, 0.0)] {
+        assert!((placed[marker].offset_part - part).abs() < 1e-12, "{:?}", placed[marker]);
+        // (1 - part) s^2 is s^2 e^2 / (s^2 + e^2)
+        let left: f64 = sd * sd + (1.0 - part) * s * s;
+        assert!((placed[marker].sd.unwrap() - left.sqrt()).abs() < 1e-12, "{:?}", placed[marker]);
+    }
+}
+
+#[test]
+fn neutral_frames_must_exist_and_be_still() {
+    let rest = markers(1.5);
+    let frame = |k: u64| {
+        let mut shown = noisy(&rest, 60 + k);
+        // the left half of the face is pulled back
+        shown.iter_mut().filter(|(name, _)| name.ends_with(".L")).for_each(|(_, p)| p[2] -= 2.5 * k as f64);
+        shown
+    };
+    let film = || recording(&(0..6).map(frame).collect::<Vec<_>>());
+    let neutral = |of: &str| registered(&rest, film(), &format!("{RIGID}neutral = {of}\n"));
+    for (of, frame) in [("{ first = 2, last = 6 }", 6), ("{ first = 9 }", 9), ("6", 6)] {
+        let error = neutral(of).unwrap_err();
+        assert!(error.code() == "K004" && error.to_string().contains(&format!("no frame {frame} to")), "{error}");
+    }
+    for sd in ["", "sd_mm = 0.3\n"] {
+        let warned = |of: &str| {
+            let (_, warnings, _) = registered(&rest, film(), &format!("{NONE}{sd}neutral = {of}\n")).unwrap();
+            warnings.into_iter().filter(|w| w.code == "K019").map(|w| w.message).collect::<Vec<_>>()
+        };
+        let told = warned("{ first = 0, last = 5 }");
+        assert_eq!(told.len(), 1, "{told:?}");
+        let words = |told: &String| {
+            told.contains("frames 0 to 5") && told.contains("mm about") && told.contains("is farthest off")
+        };
+        assert!(told.iter().all(words), "{told:?}");
+        assert_eq!(warned("{ first = 0, last = 1 }"), [""; 0]);
+        assert_eq!(warned("0"), [""; 0]);
+    }
+}
+
 #[test]
 fn a_recording_that_stands_elsewhere_is_brought_home_only_when_asked() {
     let rest = markers(1.5);

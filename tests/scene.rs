@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ActivationSpec, BlockSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, GeometrySpec,
-    LawSpec, LoadKind, PartSpec, RegisterSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
+    ActivationSpec, BlockSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, FramesSpec,
+    GeometrySpec, LawSpec, LoadKind, PartSpec, RegisterSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -114,7 +114,10 @@ fn a_whole_file_means_what_it_says() {
         (fit.units, fit.unknowns.as_slice(), fit.frames.last),
         (Some(Units::M), &["slab".to_string()][..], Some(9))
     );
-    assert_eq!((fit.registration.register, fit.registration.neutral), (RegisterSpec::Rigid, Some(3)));
+    assert_eq!(
+        (fit.registration.register, fit.registration.neutral),
+        (RegisterSpec::Rigid, Some(FramesSpec::one(3)))
+    );
     assert_eq!(fit.registration.axes.map(|axis| axis.word()), ["-x", "z", "y"]);
     assert_eq!((scene.markers[0].name.as_str(), scene.markers[0].label.as_str()), ("M01", "marker 1"));
     assert!(fit.markers.is_absolute() && fit.markers.ends_with("smile/smile.mcap"));
@@ -234,6 +237,7 @@ fn each_kind_of_mistake_is_told_with_its_place_and_remedy() {
     );
     expect("neutral = 3", "neutral = 3\nhead = {}", "C011", "{}", "add the one you mean");
     expect("neutral = 3", "neutral = -3", "C005", "-3", "a whole number from 0");
+    expect("neutral = 3", "neutral = { first = 4, last = 3 }", "C005", "3 }", "at least first = 4");
     expect("neutral = 3", "neutral = \"last\"", "C006", "\"last\"", "it can be \"first\"");
     // C006 unknown choice
     expect(
@@ -424,6 +428,17 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
         let again = Scene::parse(&lock, "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();
         assert_eq!((content(&scene), &lock), (content(&again), &again.lock()));
         assert!(lock.contains("[fit.head]"), "{lock}");
+    }
+    for (neutral, written) in [
+        ("{ last = 9 }", "neutral = { first = 0, last = 9, step = 1 }"),
+        ("{ first = 4, step = 2 }", "neutral = { first = 4, step = 2 }"),
+        ("{ first = 4, last = 4 }", "neutral = 4"),
+        ("\"first\"", "neutral = \"first\""),
+    ] {
+        let scene = parse(WHOLE, &[&format!("fit.neutral={neutral}")]).unwrap();
+        let lock = scene.lock();
+        assert!(lock.contains(written), "{written} is not in\n{lock}");
+        assert_eq!(content(&scene), content(&Scene::parse(&lock, "problem.lock.toml", Path::new("/"), &[]).unwrap()));
     }
 }
 

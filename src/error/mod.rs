@@ -16,7 +16,7 @@ pub use likely::Likely;
 pub use place::{Place, Warning};
 pub use recording::{Damage, Fault, Missing, SchemaFault, Topic, Unguarded, Unreadable};
 use recording::{encapsulation_name, list_topics};
-pub use registration::{Cause, Misregistration};
+pub use registration::{Cause, Misregistration, neutral_named};
 
 /// The result of everything in this crate that can fail.
 pub type Result<T> = std::result::Result<T, Error>;

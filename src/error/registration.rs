@@ -7,8 +7,8 @@ use super::Place;
 pub struct Misregistration {
     /// The reason.
     pub cause: Cause,
-    /// The frame of the recording that was compared with the model at rest.
-    pub frame: usize,
+    /// The frames of the recording whose mean was compared with the model at rest.
+    pub frames: Vec<usize>,
     /// Root mean square distance of its markers as they are, mm.
     pub rms_mm: f64,
     /// What to edit in the problem file.
@@ -118,7 +118,8 @@ impl Misregistration {
 
 impl std::fmt::Display for Misregistration {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Misregistration { cause, frame, rms_mm, .. } = self;
+        let Misregistration { cause, frames, rms_mm, .. } = self;
+        let frame = neutral_named(frames, "");
         match cause {
             Cause::LeftHanded { remains_mm, sides_mm, .. } => {
                 let also = match sides_mm {
@@ -130,19 +131,20 @@ impl std::fmt::Display for Misregistration {
                 };
                 write!(
                     out,
-                    "the axes of the recording look left-handed: no turn brings its frame {frame} to the model (rms {rms_mm:.2} \
-                     mm remains), a reflection leaves {remains_mm:.2} mm{also}"
+                    "the axes of the recording look left-handed: no turn brings {} to the model (rms {rms_mm:.2} \
+                     mm remains), a reflection leaves {remains_mm:.2} mm{also}",
+                    neutral_named(frames, "its ")
                 )
             }
             Cause::SidesExchanged { remains_mm, pairs } => write!(
                 out,
-                "the labels of left and right look exchanged: no turn brings frame {frame} of the recording to the model (rms \
+                "the labels of left and right look exchanged: no turn brings {frame} of the recording to the model (rms \
                  {rms_mm:.2} mm remains), with {} pairs exchanged {remains_mm:.2} mm remain",
                 pairs.len()
             ),
             Cause::LabelsExchanged { remains_mm, labels, off_mm } => write!(
                 out,
-                "labels look exchanged: in frame {frame} {}; as they are, they lie up to {off_mm:.2} mm off, exchanged an rms of \
+                "labels look exchanged: in {frame} {}; as they are, they lie up to {off_mm:.2} mm off, exchanged an rms of \
                  {remains_mm:.2} mm remains",
                 list(labels, " is where ")
                     .split(", ")
@@ -154,27 +156,35 @@ impl std::fmt::Display for Misregistration {
                 let off: Vec<String> = off.iter().map(|(name, mm)| format!("`{name}` {mm:.2} mm")).collect();
                 write!(
                     out,
-                    "frame {frame}, taken as neutral, does not look like the model at rest (rms {rms_mm:.2} mm; farthest off {}): \
+                    "{frame}, taken as neutral, does not look like the model at rest (rms {rms_mm:.2} mm; farthest off {}): \
                      frame {better} does (rms {remains_mm:.2} mm)",
                     off.join(", ")
                 )
             }
             Cause::NotInPlace { remains_mm, turned_deg, moved_mm } => write!(
                 out,
-                "the recording does not stand where the model does: rms {rms_mm:.2} mm in frame {frame}; turned by {turned_deg:.2} \
+                "the recording does not stand where the model does: rms {rms_mm:.2} mm in {frame}; turned by {turned_deg:.2} \
                  degrees and moved by {moved_mm:.2} mm it fits to {remains_mm:.2} mm (nothing was moved)"
             ),
             Cause::TooFew { markers } => write!(
                 out,
-                "the recording cannot be placed on the model: frame {frame} shows {markers} of the markers, and three that do not \
+                "the recording cannot be placed on the model: {frame} shows {markers} of the markers, and three that do not \
                  lie on a line are needed"
             ),
             Cause::NoSuchFrame { count } => write!(
                 out,
-                "the recording has {count} frames, 0 to {}: there is no frame {frame} to be neutral",
+                "the recording has {count} frames, 0 to {}: there is no {frame} to be neutral",
                 count.saturating_sub(1)
             ),
         }
+    }
+}
+
+/// `frame 3`, or `the mean of frames 0 to 9`; `its` stands before the word.
+pub fn neutral_named(frames: &[usize], its: &str) -> String {
+    match frames {
+        [first, .., last] => format!("the mean of {its}frames {first} to {last}"),
+        _ => frames.iter().map(|frame| format!("{its}frame {frame}")).collect(),
     }
 }
 

@@ -3,8 +3,8 @@
 //!
 //! With T_f the motion that takes the shape s to frame f,
 //!   s_k = mean over the frames that show marker k of T_f^-1(z_fk),   T_f = least squares of s to z_f,
-//! in turn until the shape rests (generalised Procrustes analysis, Gower 1975, of what is shown). It begins with the neutral frame
-//! and stays in its coordinates.
+//! in turn until the shape rests (generalised Procrustes analysis, Gower 1975, of what is shown). It begins with the neutral
+//! frame that shows the most, and stays where the neutral frames have it.
 
 use crate::math::motion::{Allowed, Motion, Pair, least_squares, robust};
 use crate::math::tensor::{Vector, add_scaled, norm, subtract};
@@ -14,10 +14,16 @@ const ROUNDS: usize = 100;
 /// A shape that changes by less than this part of a distance that is off rests.
 const RESTS: f64 = 1e-7;
 
+/// The first of the neutral frames that show the most.
+pub(super) fn fullest(frames: &[Vec<Option<Vector>>], neutral: &[usize]) -> usize {
+    let shown = |frame: &&usize| frames[**frame].iter().flatten().count();
+    neutral.iter().rev().max_by_key(shown).copied().unwrap_or(0)
+}
+
 /// The shape: per marker, `None` for one that no frame places. `frames` holds of every frame where each marker is; of those that the
-/// neutral frame shows, one that is farther off than the others allow, and than `least`, does not count in a frame.
-pub(super) fn shape(frames: &[Vec<Option<Vector>>], neutral: usize, least: f64) -> Vec<Option<Vector>> {
-    let mut shape = frames[neutral].clone();
+/// first neutral frame shows, one that is farther off than the others allow, and than `least`, does not count in a frame.
+pub(super) fn shape(frames: &[Vec<Option<Vector>>], neutral: &[usize], least: f64) -> Vec<Option<Vector>> {
+    let mut shape = frames[fullest(frames, neutral)].clone();
     let mut counted: Vec<Vec<Option<Vector>>> = frames.to_vec();
     for frame in &mut counted {
         let known: Vec<usize> = (0..shape.len()).filter(|k| shape[*k].is_some() && frame[*k].is_some()).collect();
@@ -27,9 +33,11 @@ pub(super) fn shape(frames: &[Vec<Option<Vector>>], neutral: usize, least: f64) 
             off.for_each(|(k, _)| frame[*k] = None);
         }
     }
+    let pairs = |shape: &[Option<Vector>], frame: &[Option<Vector>]| -> Vec<Pair> {
+        shape.iter().zip(frame).filter_map(|(s, z)| s.zip(*z)).collect()
+    };
     let fitted = |shape: &[Option<Vector>], frame: &[Option<Vector>]| -> Option<Motion> {
-        let pairs: Vec<Pair> = shape.iter().zip(frame).filter_map(|(s, z)| s.zip(*z)).collect();
-        least_squares(&pairs, Allowed::RIGID)
+        least_squares(&pairs(shape, frame), Allowed::RIGID)
     };
     for _ in 0..ROUNDS {
         let back: Vec<Option<Motion>> =
@@ -49,8 +57,9 @@ pub(super) fn shape(frames: &[Vec<Option<Vector>>], neutral: usize, least: f64) 
             break;
         }
     }
-    // the mean has moved a little from where the neutral frame has it
-    if let Some(motion) = fitted(&shape, &counted[neutral]) {
+    // the mean has moved a little from where the neutral frames have it
+    let at_rest: Vec<Pair> = neutral.iter().flat_map(|frame| pairs(&shape, &counted[*frame])).collect();
+    if let Some(motion) = least_squares(&at_rest, Allowed::RIGID) {
         shape.iter_mut().flatten().for_each(|x| *x = motion.place(*x));
     }
     shape
@@ -77,7 +86,7 @@ mod tests {
         (frames[0][1], frames[0][4]) = (None, None);
         // other frames have lost others
         (frames[2][0], frames[3][2], frames[4][3], frames[5][4]) = (None, None, None, None);
-        for (found, truth) in shape(&frames, 0, 0.4).iter().zip(BONES) {
+        for (found, truth) in shape(&frames, &[0], 0.4).iter().zip(BONES) {
             let apart = norm(subtract(found.unwrap(), truth));
             assert!(apart < 1e-6, "{found:?} instead of {truth:?}");
         }
@@ -89,7 +98,7 @@ mod tests {
         for frame in &mut frames[2..] {
             frame[4] = frame[4].map(|[x, y, z]| [x + 2.0, y, z - 1.0]);
         }
-        for (found, truth) in shape(&frames, 0, 0.4).iter().zip(BONES) {
+        for (found, truth) in shape(&frames, &[0], 0.4).iter().zip(BONES) {
             assert!(norm(subtract(found.unwrap(), truth)) < 1e-9, "{found:?} instead of {truth:?}");
         }
     }

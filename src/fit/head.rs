@@ -1,10 +1,10 @@
 //! The motion of the head, taken out of a recording before it is fitted.
 //!
-//! With h_f the motion that takes the head from the neutral frame to frame f, every position z of frame f becomes h_f^-1(z):
+//! With h_f the motion that takes the head from where it is in the neutral frames (in their mean, if they are several) to frame f, every position z of frame f becomes h_f^-1(z):
 //! where it would be if the head had stayed. h_f comes from markers that sit on bone (one robust rigid fit per frame), or from
-//! a topic of poses P: h_f = P_f P_neutral^-1.
+//! a topic of poses P: h_f = P_f P_neutral^-1. The noise of the mean of n frames is 1 / sqrt(n) of that of one.
 
-use super::bone_shape::shape;
+use super::bone_shape::{fullest, shape};
 use super::placement::unknown_label;
 use crate::error::{Cause, Error, Misregistration, Result, Warning};
 use crate::markers::{BoneNoise, Poses, Recording};
@@ -13,7 +13,7 @@ use crate::math::tensor::{norm, subtract};
 use crate::scene::{AxisSpec, FitSpec, HeadSpec};
 
 /// A bone marker farther off than this part of their spread, and than the others allow, has slipped.
-const SLIPPED: f64 = 0.02;
+pub(super) const SLIPPED: f64 = 0.02;
 /// One that is off in more than this part of the frames is named.
 const OFTEN: f64 = 0.05;
 
@@ -31,7 +31,7 @@ pub struct HeadMotion {
 /// The head in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeadFrame {
-    /// From the neutral frame to this one, in the coordinates of the model once the recording is registered. `None` where it is
+    /// From the neutral frames to this one, in the coordinates of the model once the recording is registered. `None` where it is
     /// not known: the positions of such a frame count as lost.
     pub motion: Option<Motion>,
     /// Root mean square distance of the bone markers from where a rigid head would carry them, mm; those that are off are left
@@ -56,15 +56,15 @@ pub struct Slip {
     pub most_mm: f64,
 }
 
-/// Takes the motion of the head out of a recording whose axes are those of the model; `neutral` is the frame where it has not
-/// moved. `None` where nothing was asked for.
+/// Takes the motion of the head out of a recording whose axes are those of the model; `neutral` are the frames that say
+/// where it belongs. `None` where nothing was asked for.
 ///
 /// # Errors
-/// K002: a bone marker that the recording does not have; K012: the neutral frame does not show where the head is.
+/// K002: a bone marker that the recording does not have; K012: no neutral frame shows where the head is.
 pub fn still(
     fit: &FitSpec,
     recording: &mut Recording,
-    neutral: usize,
+    neutral: &[usize],
     poses: Option<&Poses>,
 ) -> Result<Option<(HeadMotion, Vec<Warning>)>> {
     let spec = &fit.registration;
@@ -87,10 +87,10 @@ pub fn still(
     Ok(Some((HeadMotion { source: spec.head.clone(), frames, slipped }, warnings)))
 }
 
-fn unknown(fit: &FitSpec, neutral: usize, markers: usize) -> Error {
+fn unknown(fit: &FitSpec, neutral: &[usize], markers: usize) -> Error {
     Error::Misregistered(Box::new(Misregistration {
         cause: Cause::TooFew { markers },
-        frame: neutral,
+        frames: neutral.to_vec(),
         rms_mm: 0.0,
         place: fit.registration.head_place.clone(),
     }))
@@ -100,7 +100,7 @@ fn from_markers(
     fit: &FitSpec,
     labels: &[String],
     recording: &Recording,
-    neutral: usize,
+    neutral: &[usize],
 ) -> Result<(Vec<HeadFrame>, Vec<Slip>, Option<BoneNoise>)> {
     let column = |label: &String| {
         let found = recording.labels.iter().position(|known| known == label);
@@ -113,7 +113,7 @@ fn from_markers(
     let columns: Vec<usize> = columns.into_iter().flatten().collect();
     let bones: Vec<Vec<Option<[f64; 3]>>> =
         recording.frames.iter().map(|frame| columns.iter().map(|c| frame.positions_mm[*c]).collect()).collect();
-    let known: Vec<[f64; 3]> = bones[neutral].iter().flatten().copied().collect();
+    let known: Vec<[f64; 3]> = bones[fullest(&bones, neutral)].iter().flatten().copied().collect();
     if known.len() < 3 {
         return Err(unknown(fit, neutral, known.len()));
     }
@@ -150,7 +150,9 @@ fn from_markers(
         freedom += (3 * markers).saturating_sub(6);
         frames.push(HeadFrame { motion: Some(agreed.motion), rms_mm: Some(agreed.rms), markers });
     }
-    let Some(back) = frames[neutral].motion.map(|motion| motion.inverse()) else {
+    let neutral_seen: Vec<usize> = neutral.iter().copied().filter(|frame| frames[*frame].motion.is_some()).collect();
+    let at_rest: Vec<Motion> = neutral_seen.iter().filter_map(|frame| frames[*frame].motion).collect();
+    let Some(back) = Motion::mean(&at_rest, middle(&rest)).map(|motion| motion.inverse()) else {
         return Err(unknown(fit, neutral, known.len()));
     };
     for frame in &mut frames {
@@ -162,16 +164,22 @@ fn from_markers(
     let noise = (freedom > 0).then(|| BoneNoise {
         variance_mm2: square / freedom as f64,
         neutral_mm: rest,
-        neutral,
+        neutral: neutral_seen,
         shown: counted,
     });
     Ok((frames, slips, noise))
 }
 
-fn from_poses(fit: &FitSpec, recording: &Recording, neutral: usize, poses: Option<&Poses>) -> Result<Vec<HeadFrame>> {
+fn from_poses(
+    fit: &FitSpec,
+    recording: &Recording,
+    neutral: &[usize],
+    poses: Option<&Poses>,
+) -> Result<Vec<HeadFrame>> {
     let axes = axes(fit.registration.axes);
     let at = |stamp_ns: i64| Some(axes.inverse().then(&poses?.at(stamp_ns)?).then(&axes));
-    let back = at(recording.frames[neutral].stamp_ns).ok_or_else(|| unknown(fit, neutral, 0))?.inverse();
+    let at_rest: Vec<Motion> = neutral.iter().filter_map(|frame| at(recording.frames[*frame].stamp_ns)).collect();
+    let back = Motion::mean(&at_rest, [0.0; 3]).ok_or_else(|| unknown(fit, neutral, 0))?.inverse();
     let frame = |stamp_ns| HeadFrame { motion: at(stamp_ns).map(|now| back.then(&now)), rms_mm: None, markers: 0 };
     Ok(recording.frames.iter().map(|shown| frame(shown.stamp_ns)).collect())
 }

@@ -2,7 +2,8 @@
 //!
 //! The head was taken out of the recording with a motion that is off by a small turn and shift h. h has the covariance
 //!   C = C_t + C_0,   C = s^2 (H_b^T H_b)^-1
-//! of the bone markers in the frame, and of those in the neutral frame, which is the same for all frames; s is the standard
+//! of the bone markers in the frame, and C_0 of the mean of the neutral frames (the mean of theirs over their number), the same for all
+//! frames; s is the standard
 //! deviation of one of their coordinates, H_b = d(position)/dh. Controls that are fitted with the information A have, with H of
 //! the skin markers and G = J^T W H, the covariance
 //!   A^-1 + A^-1 G C G^T A^-1 = (A - G K G^T)^-1,   K = (C^-1 + G^T A^-1 G)^-1
@@ -49,7 +50,9 @@ impl HeadError {
             }
             Some(information.cholesky()?.inverse() * *variance_mm2)
         };
-        Some(HeadError { own: covariance(frame)?, common: covariance(*neutral)?, centre })
+        let all: Matrix6<f64> = neutral.iter().map(|frame| covariance(*frame)).sum::<Option<_>>()?;
+        let common = all / (neutral.len() * neutral.len()) as f64;
+        Some(HeadError { own: covariance(frame)?, common, centre })
     }
 
     /// The standard deviation that the head of this frame gives a place, along the direction where it is greatest, mm.
@@ -72,12 +75,17 @@ impl HeadError {
     }
 }
 
-/// K018: chosen frames whose bone markers leave a marker open, being few, in a heap or far from it.
-pub(super) fn open(fit: &FitSpec, recording: &Recording, neutral: usize, markers: &[Marker]) -> Option<Warning> {
+/// K018, with where the markers are `at_rest`: chosen frames whose bone markers leave a marker open, being few, in a heap or far from it.
+pub(super) fn open(
+    fit: &FitSpec,
+    recording: &Recording,
+    at_rest: &[Option<[f64; 3]>],
+    markers: &[Marker],
+) -> Option<Warning> {
     let (HeadSpec::BoneMarkers(labels), Some(bones)) = (&fit.registration.head, &recording.bones) else {
         return None;
     };
-    let place = |m: &Marker| Some((m.name.clone(), recording.frames[neutral].positions_mm[m.column]?));
+    let place = |m: &Marker| Some((m.name.clone(), at_rest[m.column]?));
     let places: Vec<(String, [f64; 3])> = markers.iter().filter_map(place).collect();
     let noise = bones.variance_mm2.sqrt();
     // the marker that is worst in a frame, where it is bad

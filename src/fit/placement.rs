@@ -1,6 +1,6 @@
 //! Markers on the model: from a name and a position in the problem to a material point and a label of the recording.
 
-use super::registration::neutral_frame;
+use super::registration::{at_rest, neutral_frames};
 use crate::error::{Error, Place, Result};
 use crate::markers::Recording;
 use crate::math::motion::{Pair, spread};
@@ -17,23 +17,24 @@ pub struct Marker {
     pub point: MaterialPoint,
     /// How far the position in the problem was from the surface, mm.
     pub distance: f64,
-    /// Standard deviation of its measured coordinates, mm, with what the neutral frame leaves open of its offset; `None` where
+    /// Standard deviation of its measured coordinates, mm, with what the neutral frames leave open of its offset; `None` where
     /// the problem gives none.
     pub sd: Option<f64>,
-    /// What part of its distance in the neutral frame is taken for an offset.
+    /// What part of its distance at rest is taken for an offset.
     pub offset_part: f64,
     /// Its column in the recording.
     pub column: usize,
 }
 
 impl Marker {
-    /// An offset of the standard deviation s, of which a neutral frame with the noise sd tells all but s sd / sqrt(s^2 + sd^2):
-    ///   o = s^2 / (s^2 + sd^2) (z - x),  sd'^2 = sd^2 + s^2 sd^2 / (s^2 + sd^2), or sd^2 + s^2 where that frame does not show it.
+    /// An offset of the standard deviation s, of which the mean of n neutral frames, with the noise e = sd / sqrt(n), tells all but
+    /// s e / sqrt(s^2 + e^2):
+    ///   o = s^2 / (s^2 + e^2) (z - x),  sd'^2 = sd^2 + s^2 e^2 / (s^2 + e^2), or sd^2 + s^2 where none of them shows it.
     /// The rest of it is one error for all frames; each frame counts it as its own.
-    fn with_offset(&mut self, s: f64, seen: bool) {
-        let noise = self.sd.map_or(0.0, |sd| sd * sd);
-        let part = if seen { s * s / (s * s + noise) } else { 0.0 };
-        let left = if seen { part * noise } else { s * s };
+    fn with_offset(&mut self, s: f64, seen: usize) {
+        let noise = self.sd.map_or(0.0, |sd| sd * sd / seen.max(1) as f64);
+        let part = if seen > 0 { s * s / (s * s + noise) } else { 0.0 };
+        let left = if seen > 0 { part * noise } else { s * s };
         self.sd = self.sd.map(|sd| (sd * sd + left).sqrt());
         self.offset_part = part;
     }
@@ -69,10 +70,10 @@ pub fn place(scene: &Scene, fit: &FitSpec, mesh: &Mesh, recording: &Recording) -
         }
     }
     if let Some(prior) = fit.registration.offset_sd_mm.filter(|_| mistakes.is_empty()) {
-        let neutral = neutral_frame(fit, &markers, recording)?;
+        let neutral = neutral_frames(fit, &markers, recording)?;
         for marker in &mut markers {
-            let seen = recording.frames.get(neutral).is_some_and(|n| n.positions_mm[marker.column].is_some());
-            marker.with_offset(prior, seen);
+            let shown = neutral.iter().filter_map(|frame| recording.frames.get(*frame)?.positions_mm[marker.column]);
+            marker.with_offset(prior, shown.count());
         }
     }
     if mistakes.is_empty() { Ok(markers) } else { Err(Error::all(mistakes)) }
@@ -95,15 +96,13 @@ pub(super) fn unknown_label(name: &str, labels: &[String], place: &Place) -> Err
     Error::UnknownLabel { name: name.into(), labels: list.into(), nearest, place: Box::new(place.clone()) }
 }
 
-/// Compares the size of the marker cloud in the recording with the model's, in the first of the frames that show the most
-/// markers.
+/// Compares the size of the marker cloud in the recording with the model's, in the neutral frames.
 ///
 /// # Errors
 /// As [`units_against`].
 pub fn check_units(markers: &[Marker], mesh: &Mesh, recording: &Recording, fit: &FitSpec) -> Result<()> {
-    let frame = neutral_frame(fit, markers, recording)?;
-    let Some(shown) = recording.frames.get(frame) else { return Ok(()) };
-    let pair = |m: &Marker| shown.positions_mm[m.column].map(|z| (z, mesh.position(m.point)));
+    let rest = at_rest(fit, recording, &neutral_frames(fit, markers, recording)?);
+    let pair = |m: &Marker| rest[m.column].map(|z| (z, mesh.position(m.point)));
     let pairs: Vec<Pair> = markers.iter().filter_map(pair).collect();
     // a size that was estimated has been brought to the model's by now
     units_against(&pairs, fit.units.unwrap_or(Units::Mm), fit)

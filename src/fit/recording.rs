@@ -3,7 +3,7 @@
 use super::outer;
 use crate::error::{Error, Result};
 use crate::markers::{self, Poses, ReadOptions, Recording, read_poses, read_poses_bytes};
-use crate::scene::{FitSpec, FramesSpec, HeadSpec, Units};
+use crate::scene::{FitSpec, HeadSpec, Units};
 
 /// How a fit wants its recording read.
 pub fn options(fit: &FitSpec) -> ReadOptions {
@@ -47,11 +47,8 @@ pub fn poses(fit: &FitSpec, recording: &Recording, embedded: Option<&[u8]>) -> R
 /// Where the recording does not have the first or the last of them, or one that `[fit.outer]` names.
 pub fn chosen_frames(fit: &FitSpec, recording: &Recording) -> Result<Vec<usize>> {
     let count = recording.frames.len();
-    let FramesSpec { first, last, step } = fit.frames;
-    let last = last.unwrap_or(count.saturating_sub(1));
-    if let Some(frame) = [first, last].into_iter().find(|frame| *frame >= count) {
-        return Err(Error::NoSuchFrame { frame, count, place: Box::new(fit.frames_place.clone()) });
-    }
+    let beyond = |frame| Error::NoSuchFrame { frame, count, place: Box::new(fit.frames_place.clone()) };
+    let chosen = fit.frames.within(count).map_err(beyond)?;
     fit.outer.as_ref().map_or(Ok(()), |outer| outer::exist(outer, recording))?;
-    Ok((first..=last).step_by(step).collect())
+    Ok(chosen)
 }

@@ -30,10 +30,10 @@ pub struct Recording {
 pub struct BoneNoise {
     /// Variance of a coordinate, mm2, as their distances from a rigid head estimate it.
     pub variance_mm2: f64,
-    /// Where each of them is when the head is as in the neutral frame, mm; `None` for one that no frame places.
+    /// Where each of them is when the head is as in the neutral frames, mm; `None` for one that no frame places.
     pub neutral_mm: Vec<Option<[f64; 3]>>,
-    /// The neutral frame.
-    pub neutral: usize,
+    /// The neutral frames that show where the head is.
+    pub neutral: Vec<usize>,
     /// Of every frame those that counted.
     pub shown: Vec<Vec<usize>>,
 }

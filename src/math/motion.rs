@@ -73,6 +73,23 @@ impl Motion {
         Motion { scale: self.scale * next.scale, turn, shift: next.place(self.shift) }
     }
 
+    /// The rigid motion nearest to several of them: its turn has the least squared distance from theirs (the chordal mean), and
+    /// it takes the point `about` to the mean of where they take it. `None` of none.
+    pub fn mean(motions: &[Motion], about: Vector) -> Option<Motion> {
+        if let [one] = motions {
+            return Some(*one);
+        }
+        // points around `about` whose second moment is the same in all directions
+        let around = (0..6).map(|k| {
+            let mut point = about;
+            point[k / 2] += if k % 2 == 0 { 1.0 } else { -1.0 };
+            point
+        });
+        let pairs: Vec<Pair> =
+            motions.iter().flat_map(|motion| around.clone().map(|x| (x, motion.place(x)))).collect();
+        least_squares(&pairs, Allowed::RIGID)
+    }
+
     /// Rotation vector of the turn: its axis times its angle (radians, 0 to pi).
     pub fn rotation_vector(&self) -> Vector {
         let r = &self.turn;
@@ -258,6 +275,19 @@ fn triples(n: usize) -> impl Iterator<Item = [usize; 3]> {
 mod tests {
     use super::*;
     use crate::math::tensor::{cross, determinant, normalised, rotation};
+
+    /// Turns about one axis have the mean of their angles, and the place that is asked for goes to the mean of where they take it.
+    #[test]
+    fn the_mean_of_turns_about_an_axis_is_in_the_middle() {
+        let (axis, about) = (normalised([1.0, -2.0, 0.5]), [70.0, -20.0, 30.0]);
+        let at = |angle: f64| Motion { scale: 1.0, turn: rotation(axis, angle), shift: [3.0 * angle, 1.0, -angle] };
+        let all = [0.1, 0.4, 0.7].map(at);
+        let mean = Motion::mean(&all, about).unwrap();
+        assert!((mean.rotation_vector()[0] - 0.4 * axis[0]).abs() < 1e-12, "{mean:?}");
+        let place = centre(all.iter().map(|motion| motion.place(about)));
+        assert!(norm(subtract(mean.place(about), place)) < 1e-12, "{mean:?}");
+        assert_eq!((Motion::mean(&all[..1], about), Motion::mean(&[], about)), (Some(all[0]), None));
+    }
 
     fn points(n: usize) -> Vec<Vector> {
         (0..n).map(|k| [0, 1, 2].map(|i| 40.0 * ((3 * k + 7 * i + k * k * i) as f64 * 0.7).sin())).collect()

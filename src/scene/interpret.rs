@@ -580,7 +580,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     })
 }
 
-fn frames(table: &mut Table) -> Option<FramesSpec> {
+/// `frames`, and `neutral` where it is several.
+pub(super) fn frames(table: &mut Table) -> Option<FramesSpec> {
     let first = table.or("first", 0, |item| item.whole(0, MOST_FRAMES));
     let last = table.optional("last", |item| item.whole(0, MOST_FRAMES));
     let step = table.or("step", 1, |item| item.whole(1, MOST_FRAMES));

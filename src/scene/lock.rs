@@ -446,7 +446,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         objectives,
         outer,
         max_marker_distance_mm,
-        frames: FramesSpec { first, last, step },
+        frames,
         registration:
             RegistrationSpec {
                 register,
@@ -476,7 +476,15 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         ReuseSpec::Broyden => "broyden",
     };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
-    let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
+    let range = |FramesSpec { first, last, step }: &FramesSpec| {
+        let last = last.map(|last| format!("last = {last}, ")).unwrap_or_default();
+        format!("{{ first = {first}, {last}step = {step} }}")
+    };
+    let neutral = match neutral {
+        None => "\"first\"".into(),
+        Some(frames) if frames.last == Some(frames.first) => frames.first.to_string(),
+        Some(frames) => range(frames),
+    };
     lines.extend([
         "\n[fit]".into(),
         format!("markers = {}", path(markers)),
@@ -495,9 +503,9 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     objective_lines(objectives, lines);
     lines.extend([
         format!("max_marker_distance_mm = {}", number(*max_marker_distance_mm)),
-        format!("frames = {{ first = {first}, {last}step = {step} }}"),
+        format!("frames = {}", range(frames)),
         format!("register = \"{}\"", register.word()),
-        neutral.map_or("neutral = \"first\"".into(), |frame| format!("neutral = {frame}")),
+        format!("neutral = {neutral}"),
     ]);
     lines.extend(offset_sd_mm.map(|sd| format!("offset_sd_mm = {}", number(sd))));
     lines.extend([

@@ -1,7 +1,8 @@
 //! How a recording is brought to the model: `[fit] register`, `neutral`, `axes` and `head`.
 
 use super::cursor::{Item, POSITIVE, Reader, Table};
-use super::spec::{AxisSpec, HeadSpec, RegisterSpec, RegistrationSpec};
+use super::interpret::frames;
+use super::spec::{AxisSpec, FramesSpec, HeadSpec, RegisterSpec, RegistrationSpec};
 use super::tree::Value;
 use super::units::Units;
 
@@ -21,7 +22,8 @@ pub(super) fn registration(table: &mut Table, units: Option<Option<Units>>) -> O
     let register_place = table.place_of("register");
     let neutral = table.or("neutral", None, |item| match item.node.value {
         Value::Text(_) => item.choice(&[("first", None)], &[]),
-        _ => item.whole(0, MOST_FRAMES).map(Some),
+        Value::Table(_) => item.table(frames).map(Some),
+        _ => item.whole(0, MOST_FRAMES).map(|frame| Some(FramesSpec::one(frame))),
     });
     let neutral_place = table.place_of("neutral");
     let offset_sd_mm = table.optional("offset_sd_mm", |item| item.number(POSITIVE));

@@ -831,10 +831,10 @@ pub struct FitSpec {
 pub struct RegistrationSpec {
     /// By which motion.
     pub register: RegisterSpec,
-    /// The frame in which nothing has moved yet; by default the first of those that show the most markers.
-    pub neutral: Option<usize>,
-    /// How far markers sit from where the model has them on the skin, standard deviation per coordinate, mm: the neutral frame
-    /// then tells each of these offsets. `None`: not at all.
+    /// The frames in which the face is at rest, often one; by default the first of those that show the most markers.
+    pub neutral: Option<FramesSpec>,
+    /// How far markers sit from where the model has them on the skin, standard deviation per coordinate, mm: the neutral frames
+    /// then tell each of these offsets. `None`: not at all.
     pub offset_sd_mm: Option<f64>,
     /// The axes of the recording that are x, y and z of the model, before that motion.
     pub axes: [AxisSpec; 3],
@@ -846,7 +846,7 @@ pub struct RegistrationSpec {
     /// The word of `register`; the table where there is none.
     #[serde(skip)]
     pub register_place: Place,
-    /// The choice of the neutral frame; the table where there is none.
+    /// The choice of neutral frames; the table where there is none.
     #[serde(skip)]
     pub neutral_place: Place,
 }
@@ -948,6 +948,26 @@ pub struct FramesSpec {
     pub last: Option<usize>,
     /// The distance between frames, at least 1.
     pub step: usize,
+}
+
+impl FramesSpec {
+    /// One frame.
+    pub fn one(frame: usize) -> FramesSpec {
+        FramesSpec { first: frame, last: Some(frame), step: 1 }
+    }
+
+    /// These frames of a recording that has `count`.
+    ///
+    /// # Errors
+    /// The first or the last of them, where the recording does not have it.
+    pub fn within(self, count: usize) -> std::result::Result<Vec<usize>, usize> {
+        let FramesSpec { first, last, step } = self;
+        let last = last.unwrap_or(count.saturating_sub(1));
+        match [first, last].into_iter().find(|frame| *frame >= count) {
+            Some(beyond) => Err(beyond),
+            None => Ok((first..=last).step_by(step).collect()),
+        }
+    }
 }
 
 /// How equilibrium is found: `[solver]`.

@@ -48,6 +48,8 @@ pub struct Conditions {
     pub lost: f64,
     /// How the motion of the head is known.
     pub head: Head,
+    /// Frames in which face and head are at rest, the neutral ones: the first of the clip, after so many less one before it.
+    pub neutral: usize,
 }
 
 /// Sums over fitted frames.
@@ -168,7 +170,8 @@ const BONES: [[f64; 3]; 6] = [
     [90.0, 10.0, 100.0],
 ];
 
-/// Writes a recording with two gross outliers; markers are lost from the third frame on.
+/// Writes a recording with two gross outliers; markers are lost from the third frame on. The frames at rest that come before the
+/// clip have noise only, which leaves that of the clip as it is without them.
 pub fn record(path: &Path, clean: &[Vec<[f64; 3]>], conditions: &Conditions, seed: u64) {
     let mut random = super::Random::new(seed);
     let skin = clean[0].len();
@@ -200,9 +203,21 @@ pub fn record(path: &Path, clean: &[Vec<[f64; 3]>], conditions: &Conditions, see
             }
             positions_mm.push(shown);
         }
-        Frame { time_s: k as f64 / RATE_HZ, stamp_ns: 1_000_000_000 + k as i64 * 33_333_333, positions_mm }
+        Frame { time_s: 0.0, stamp_ns: 0, positions_mm }
     };
-    let frames: Vec<Frame> = clean.iter().enumerate().map(frame).collect();
+    let clip: Vec<Frame> = clean.iter().enumerate().map(frame).collect();
+    let mut still = |_| {
+        let places = clean[0].iter().chain(&BONES[..bones]);
+        let noisy = places.map(|x| Some(x.map(|x| x + conditions.noise_mm * normal(&mut random))));
+        Frame { positions_mm: noisy.collect(), ..clip[0].clone() }
+    };
+    let before: Vec<Frame> = (1..conditions.neutral).map(&mut still).collect();
+    let at = |(k, shown): (usize, Frame)| Frame {
+        time_s: k as f64 / RATE_HZ,
+        stamp_ns: 1_000_000_000 + k as i64 * 33_333_333,
+        ..shown
+    };
+    let frames: Vec<Frame> = before.into_iter().chain(clip.clone()).enumerate().map(at).collect();
     let options = WriteOptions { units: Units::M, ..WriteOptions::default() };
     write_json(path, &labels, &frames, &options).expect("written");
 }
@@ -220,9 +235,16 @@ pub fn fit(path: &Path, truth: &[Vec<f64>], conditions: &Conditions, estimate: b
         Head::Bones => "[fit.head]\nbone_markers = [\"H0\", \"H1\", \"H2\", \"H3\", \"H4\", \"H5\"]\n",
         Head::Estimated => "[fit.head]\nestimate = true\n",
     };
+    let neutral = match conditions.neutral {
+        1 => "0".to_owned(),
+        several => format!("{{ first = 0, last = {} }}", several - 1),
+    };
     let read_as = |lines: &str| {
         let scene = problem(
-            &format!("neutral = 0\nsd_mm = {}\nloss = {{ cauchy_sds = 4 }}\n{lines}{head}", conditions.noise_mm),
+            &format!(
+                "neutral = {neutral}\nsd_mm = {}\nloss = {{ cauchy_sds = 4 }}\n{lines}{head}",
+                conditions.noise_mm
+            ),
             &[FITTED],
         );
         let built = build(&scene).unwrap_or_else(|error| panic!("{error}"));
@@ -237,7 +259,9 @@ pub fn fit(path: &Path, truth: &[Vec<f64>], conditions: &Conditions, estimate: b
     let placed = placement::place(&scene, spec, model.mesh(), &clip).unwrap_or_else(|error| panic!("{error}"));
     register(&scene, spec, model.mesh(), &placed, &mut clip, None).unwrap_or_else(|error| panic!("{error}"));
     let mut alone = Fit::new(model, &scene, spec, &clip).unwrap_or_else(|error| panic!("{error}"));
-    let frames: Vec<usize> = (0..truth.len()).collect();
+    // those before the clip only say what is neutral
+    let first = conditions.neutral - 1;
+    let frames: Vec<usize> = (first..first + truth.len()).collect();
     let found: Vec<Option<Estimate>> = frames.iter().map(|k| alone.frame(&clip, *k).ok()).collect();
     let mut whole = Fit::new(model, &tied, tied.fit.as_ref().expect("a fit"), &clip).expect("as before");
     let smoothed = whole.smooth(&clip, &frames, &found, &|| false).unwrap_or_else(|error| panic!("{error}"));
@@ -258,7 +282,7 @@ pub fn fit(path: &Path, truth: &[Vec<f64>], conditions: &Conditions, estimate: b
         for (score, fitted) in scores.iter_mut().zip([frame.0, frame.1]) {
             let Some(fitted) = fitted else { continue };
             let biases = shift.as_ref().map(|shift| bias(fitted, alone.markers(), alone.unknowns(), shift));
-            score.count(fitted, &alone, &truth[fitted.frame], biases.as_deref().unwrap_or_default());
+            score.count(fitted, &alone, &truth[fitted.frame - first], biases.as_deref().unwrap_or_default());
         }
     }
     scores

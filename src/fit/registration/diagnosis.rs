@@ -11,7 +11,7 @@
 //! (Wrong units are told by the size alone, before: [`crate::fit::placement`].)
 
 use super::{LARGE, Neutral, OFF, mirror};
-use crate::error::{Cause, Result, Warning};
+use crate::error::{Cause, Result, Warning, neutral_named};
 use crate::math::motion::{Agreed, Allowed, Motion, Pair, least_squares, robust};
 use crate::math::tensor::{norm, subtract};
 use crate::scene::{AxisSpec, RegisterSpec};
@@ -19,11 +19,11 @@ use crate::scene::{AxisSpec, RegisterSpec};
 /// Part of what remained that may remain where a mistake explains it.
 const EXPLAINS: f64 = 0.35;
 /// Part of the spread below which a frame counts as neutral whatever the others are.
-const NEUTRAL: f64 = 0.02;
+pub(super) const NEUTRAL: f64 = 0.02;
 /// Markers that a message names.
 const NAMED: usize = 5;
 
-/// The mistake, if there is one; what is merely odd as a warning. `placed` is the neutral frame under the motion that was
+/// The mistake, if there is one; what is merely odd as a warning. `placed` are the neutral frames under the motion that was
 /// asked for, and `allowed` what that may be.
 pub(super) fn diagnose(neutral: &Neutral<'_>, placed: &Agreed, allowed: Allowed) -> Result<Option<Warning>> {
     let (pairs, size) = (&neutral.pairs, neutral.size);
@@ -181,9 +181,9 @@ fn unexplained(neutral: &Neutral<'_>, placed: &Agreed, all_mm: f64) -> Warning {
     Warning {
         code: "K013",
         message: format!(
-            "frame {} of the recording does not lie on the model at rest: rms {all_mm:.2} mm, farthest off {}; no exchange of \
+            "{} of the recording does not lie on the model at rest: rms {all_mm:.2} mm, farthest off {}; no exchange of \
              labels or axes explains it",
-            neutral.frame,
+            neutral_named(neutral.frames, ""),
             worst.join(", ")
         ),
         place: Some(neutral.fit.markers_place.clone()),

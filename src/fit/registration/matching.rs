@@ -4,7 +4,7 @@
 //! marker of the model the point that is nearest in all (least sum of squares), move the points to their markers, and again
 //! until nothing changes. The best of these ends is the proposal; the best other one says how sure it is.
 
-use super::{neutral_frame, turn_axes};
+use super::{neutral_frames, turn_axes};
 use crate::error::{Error, Result};
 use crate::fit::placement::size_against;
 use crate::markers::Recording;
@@ -40,19 +40,18 @@ pub struct Proposal {
     pub second_mm: Option<f64>,
 }
 
-/// Proposes the labels of the markers of a scene, from the frame that shows the most of all labels or is called neutral.
+/// Proposes the labels of the markers of a scene, from the frame that shows the most of all labels, or of those that are called neutral.
 ///
 /// # Errors
 /// K001: wrong units; K004: no such frame; K017: fewer than three markers on either side, or all on a line.
 pub fn propose(scene: &Scene, fit: &FitSpec, mesh: &Mesh, mut recording: Recording) -> Result<Proposal> {
     turn_axes(&mut recording, fit.registration.axes);
-    let frame = match fit.registration.neutral {
-        Some(_) => neutral_frame(fit, &[], &recording)?,
-        None => {
-            let shown = |k: &usize| recording.frames[*k].positions_mm.iter().flatten().count();
-            (0..recording.frames.len()).rev().max_by_key(shown).unwrap_or(0)
-        }
+    let candidates = match fit.registration.neutral {
+        Some(_) => neutral_frames(fit, &[], &recording)?,
+        None => (0..recording.frames.len()).collect(),
     };
+    let shown = |k: &usize| recording.frames[*k].positions_mm.iter().flatten().count();
+    let frame = candidates.into_iter().rev().max_by_key(shown).unwrap_or(0);
     let nothing = || Error::NothingToMatch { place: Box::new(fit.markers_place.clone()) };
     let positions = &recording.frames.get(frame).ok_or_else(nothing)?.positions_mm;
     let shown = recording.labels.iter().zip(positions).filter_map(|(label, p)| Some((label.as_str(), (*p)?)));

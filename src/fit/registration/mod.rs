@@ -1,4 +1,4 @@
-//! Where a recording stands, before any solve: one motion of its neutral frame to the markers of the model at rest.
+//! Where a recording stands, before any solve: one motion of its neutral frames to the markers of the model at rest.
 //!
 //! The motion is rigid, or a similarity where the recording has no true size, and most markers decide it: a few that are off
 //! do not turn it ([`crate::math::motion::robust`]). What keeps the two apart is named (`diagnosis`), and nothing is
@@ -7,16 +7,18 @@
 mod diagnosis;
 mod matching;
 mod mirror;
+mod neutral;
 mod scale;
 
 pub use matching::{Proposal, propose};
 pub use mirror::{nearest, pairings};
+pub use neutral::{at_rest, neutral_frames};
 pub use scale::{Scale, scale};
 
 use super::head::{self, HeadMotion};
 use super::head_error;
 use super::placement::{Marker, units_against};
-use crate::error::{Cause, Error, Misregistration, Result, Warning};
+use crate::error::{Cause, Error, Misregistration, Result, Warning, neutral_named};
 use crate::markers::{Poses, Recording};
 use crate::math::motion::{Agreed, Allowed, Motion, Pair, least_squares, rms, robust, spread};
 use crate::math::tensor::{norm, subtract};
@@ -37,11 +39,11 @@ pub struct Registration {
     pub motion: Motion,
     /// How far the motion takes the centre of the markers, mm.
     pub moved_mm: f64,
-    /// The neutral frame.
-    pub neutral: usize,
+    /// The neutral frames.
+    pub neutral: Vec<usize>,
     /// How much larger the recording would have to be to be of the model's size; `None` where the markers do not say.
     pub scale: Option<Scale>,
-    /// The markers that the neutral frame shows.
+    /// The markers that the neutral frames show.
     pub markers: Vec<Registered>,
     /// Root mean square distance of those that are not off, mm.
     pub rms_mm: f64,
@@ -50,11 +52,11 @@ pub struct Registration {
     pub offset_rms_mm: Option<f64>,
     /// How the head moved, where that was taken out.
     pub head: Option<HeadMotion>,
-    /// Centre of the markers in the neutral frame on the model, mm.
+    /// Centre of the markers in the neutral frames on the model, mm.
     pub centre: [f64; 3],
 }
 
-/// A marker of the neutral frame on the model.
+/// A marker of the neutral frames on the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Registered {
     /// Its name.
@@ -65,7 +67,7 @@ pub struct Registered {
     pub off: bool,
 }
 
-/// What the neutral frame shows of the markers that are fitted.
+/// What the neutral frames show of the markers that are fitted.
 struct Neutral<'a> {
     scene: &'a Scene,
     fit: &'a FitSpec,
@@ -73,8 +75,8 @@ struct Neutral<'a> {
     /// Positions of all markers on the model at rest, mm.
     model: Vec<[f64; 3]>,
     recording: &'a Recording,
-    frame: usize,
-    /// Markers that it shows.
+    frames: &'a [usize],
+    /// Markers that they show.
     shown: Vec<usize>,
     /// (recording, model) of each of them.
     pairs: Vec<Pair>,
@@ -84,7 +86,7 @@ struct Neutral<'a> {
 
 impl Neutral<'_> {
     fn wrong(&self, cause: Cause, rms_mm: f64, place: crate::Place) -> Error {
-        Error::Misregistered(Box::new(Misregistration { cause, frame: self.frame, rms_mm, place }))
+        Error::Misregistered(Box::new(Misregistration { cause, frames: self.frames.to_vec(), rms_mm, place }))
     }
 
     fn name(&self, shown: usize) -> String {
@@ -99,7 +101,7 @@ impl Neutral<'_> {
     }
 }
 
-/// Brings a recording to the model as `[fit]` asks: its axes, then the head of every frame to where it is in the neutral one,
+/// Brings a recording to the model as `[fit]` asks: its axes, then the head of every frame to where it is in the neutral ones,
 /// then the motion that registers that. `poses` are those of the head, where they come from a topic.
 ///
 /// # Errors
@@ -113,34 +115,37 @@ pub fn register(
     poses: Option<&Poses>,
 ) -> Result<(Registration, Vec<Warning>)> {
     turn_axes(recording, fit.registration.axes);
-    let frame = neutral_frame(fit, markers, recording)?;
-    let (head, mut warnings) = head::still(fit, recording, frame, poses)?.unzip();
+    let frames = neutral_frames(fit, markers, recording)?;
+    let (head, mut warnings) = head::still(fit, recording, &frames, poses)?.unzip();
     let warnings = warnings.get_or_insert_default();
-    let (mut registration, odd) = registration(scene, fit, mesh, markers, (recording, frame))?;
+    let mut rest = at_rest(fit, recording, &frames);
+    let (mut registration, odd) = registration(scene, fit, mesh, markers, (recording, &frames, &rest))?;
     warnings.extend(odd);
     registration.head = head.map(|head| head.carried(&registration.motion));
     if registration.motion != Motion::REST {
         for position in recording.frames.iter_mut().flat_map(|frame| frame.positions_mm.iter_mut().flatten()) {
             *position = registration.motion.place(*position);
         }
+        rest.iter_mut().flatten().for_each(|x| *x = registration.motion.place(*x));
         if let Some(bones) = &mut recording.bones {
             bones.neutral_mm.iter_mut().flatten().for_each(|x| *x = registration.motion.place(*x));
             bones.variance_mm2 *= registration.motion.scale * registration.motion.scale;
         }
     }
-    warnings.extend(head_error::open(fit, recording, frame, markers));
+    warnings.extend(neutral::not_still(fit, markers, recording, (&frames, &rest)));
+    warnings.extend(head_error::open(fit, recording, &rest, markers));
     if fit.registration.offset_sd_mm.is_some() {
-        registration.offset_rms_mm = Some(take_offsets(mesh, markers, recording, frame));
+        registration.offset_rms_mm = Some(take_offsets(mesh, markers, recording, &rest));
     }
     Ok((registration, std::mem::take(warnings)))
 }
 
-/// Brings markers that sit beside their places on the model there, in every frame, as far as the neutral frame tells how far off
+/// Brings markers that sit beside their places on the model there, in every frame, as far as where they are `at_rest` tells how far off
 /// they are. The root mean square of these offsets, mm.
-fn take_offsets(mesh: &Mesh, markers: &[Marker], recording: &mut Recording, neutral: usize) -> f64 {
+fn take_offsets(mesh: &Mesh, markers: &[Marker], recording: &mut Recording, at_rest: &[Option<[f64; 3]>]) -> f64 {
     let mut lengths = Vec::with_capacity(markers.len());
     for marker in markers {
-        let Some(seen) = recording.frames[neutral].positions_mm[marker.column] else { continue };
+        let Some(seen) = at_rest[marker.column] else { continue };
         let offset = subtract(seen, mesh.position(marker.point)).map(|d| marker.offset_part * d);
         lengths.push(norm(offset));
         for position in recording.frames.iter_mut().filter_map(|frame| frame.positions_mm[marker.column].as_mut()) {
@@ -162,16 +167,15 @@ fn registration(
     fit: &FitSpec,
     mesh: &Mesh,
     markers: &[Marker],
-    (recording, frame): (&Recording, usize),
+    (recording, frames, positions): (&Recording, &[usize], &[Option<[f64; 3]>]),
 ) -> Result<(Registration, Option<Warning>)> {
     let spec = &fit.registration;
     let model: Vec<[f64; 3]> = markers.iter().map(|m| mesh.position(m.point)).collect();
-    let positions = &recording.frames[frame].positions_mm;
     let shown: Vec<usize> = (0..markers.len()).filter(|k| positions[markers[*k].column].is_some()).collect();
     let pairs: Vec<Pair> =
         shown.iter().filter_map(|k| positions[markers[*k].column].map(|z| (z, model[*k]))).collect();
     let size = spread(&pairs.iter().map(|p| p.1).collect::<Vec<_>>());
-    let neutral = Neutral { scene, fit, markers, model, recording, frame, shown, pairs, size };
+    let neutral = Neutral { scene, fit, markers, model, recording, frames, shown, pairs, size };
     if let Some(units) = fit.units {
         units_against(&neutral.pairs, units, fit)?;
     }
@@ -204,7 +208,7 @@ fn registration(
         register: spec.register,
         motion: placed.motion,
         moved_mm: moved(&placed.motion, &neutral.pairs),
-        neutral: frame,
+        neutral: frames.to_vec(),
         scale: scale(&agreeing),
         markers,
         rms_mm: placed.rms,
@@ -215,7 +219,7 @@ fn registration(
     Ok((registration, warning))
 }
 
-/// The neutral frame as it stands.
+/// The neutral frames as they stand.
 fn in_place(neutral: &Neutral<'_>) -> Agreed {
     let distances = Motion::REST.distances(&neutral.pairs);
     let off: Vec<bool> = distances.iter().map(|d| *d > OFF * neutral.size).collect();
@@ -230,27 +234,6 @@ fn moved(motion: &Motion, pairs: &[Pair]) -> f64 {
     }
     let centre = crate::math::motion::centre(pairs.iter().map(|p| p.0));
     norm(subtract(motion.place(centre), centre.map(|c| motion.scale * c)))
-}
-
-/// The frame that the problem calls neutral, or the first of those that show the most markers.
-///
-/// # Errors
-/// K004 where it does not exist.
-pub fn neutral_frame(fit: &FitSpec, markers: &[Marker], recording: &Recording) -> Result<usize> {
-    let count = recording.frames.len();
-    match fit.registration.neutral {
-        Some(frame) if frame >= count => {
-            let place = fit.registration.neutral_place.clone();
-            let cause = Cause::NoSuchFrame { count };
-            Err(Error::Misregistered(Box::new(Misregistration { cause, frame, rms_mm: 0.0, place })))
-        }
-        Some(frame) => Ok(frame),
-        None => {
-            let shown =
-                |k: &usize| markers.iter().filter(|m| recording.frames[*k].positions_mm[m.column].is_some()).count();
-            Ok((0..count).rev().max_by_key(shown).unwrap_or(0))
-        }
-    }
 }
 
 impl std::fmt::Display for Registration {
@@ -275,7 +258,8 @@ impl std::fmt::Display for Registration {
         let counted = markers.len() - off.len();
         writeln!(
             out,
-            "\n  its frame {neutral} fits the model at rest with an rms of {rms_mm:.3} mm over {counted} markers"
+            "\n  {} fits the model at rest with an rms of {rms_mm:.3} mm over {counted} markers",
+            neutral_named(neutral, "its ")
         )?;
         if !off.is_empty() {
             writeln!(out, "  {} did not count, being farther off: {}", off.len(), off.join(", "))?;
