@@ -197,6 +197,7 @@ fn check(name: &str, parts: &[&str], at: [f64; 3], scale: f64, tolerance: f64) {
     let active = closed(&found);
     let mut solver = solver(&model);
     let rates = sensitivities(Sensitivity::Tangent, &mut solver, &found, &[0, 1, 2]).expect("a regular tangent");
+    common::assert_pulled_back(name, &mut solver, &found, &rates);
     let [state] = bone_states(&model, &found.state, &found.evaluation)[..] else { panic!("one bone") };
     let work = [None, state.torque.map(f64::to_radians), state.slide_force];
     for (control, step) in [5e-4, 2e-2, 1e-2].map(|step| scale * step).into_iter().enumerate() {

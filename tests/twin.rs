@@ -143,8 +143,8 @@ fn kept_sensitivities_give_the_same_answer() {
             *position = std::array::from_fn(|i| position[i] + off(i));
         }
     }
-    let fresh = fit(&twin.labels, &frames, &chosen, "");
-    for reuse in ["frozen", "broyden"] {
+    let fresh = fit(&twin.labels, &frames, &chosen, "reuse = \"fresh\"\n");
+    for reuse in ["frozen", "broyden", "adjoint"] {
         let kept = fit(&twin.labels, &frames, &chosen, &format!("reuse = \"{reuse}\"\n"));
         for (a, b) in fresh.iter().zip(&kept) {
             assert!(a.rms_mm > 0.1, "the markers are off");
@@ -157,6 +157,34 @@ fn kept_sensitivities_give_the_same_answer() {
         }
         let steps = |all: &[Estimate]| all.iter().map(|e| e.iterations.len()).sum::<usize>();
         println!("{reuse}: {} steps, fresh {}", steps(&kept), steps(&fresh));
+    }
+}
+
+/// A tolerance in standard deviations: the answer is so near to the optimum, in fewer steps, also where the markers themselves
+/// say how far they scatter.
+#[test]
+fn a_tolerance_in_standard_deviations_is_kept() {
+    let twin = twin();
+    let chosen: Vec<usize> = (10..16).collect();
+    let mut frames = frames(&twin.positions_mm);
+    for (k, frame) in frames.iter_mut().enumerate() {
+        for (m, position) in frame.positions_mm.iter_mut().flatten().enumerate() {
+            let off = |i: usize| 0.3 * ((7 * k + 5 * m + 3 * i) as f64).sin();
+            *position = std::array::from_fn(|i| position[i] + off(i));
+        }
+    }
+    for known in ["", "sd_mm = 0.2\n"] {
+        let tight = fit(&twin.labels, &frames, &chosen, known);
+        let loose = fit(&twin.labels, &frames, &chosen, &format!("{known}tolerance = {{ sds = 0.1 }}\n"));
+        for (a, b) in tight.iter().zip(&loose) {
+            let moved = a.equilibrium.state.controls.iter().zip(&b.equilibrium.state.controls).zip(&a.sd);
+            for sds in moved.filter_map(|((a, b), sd)| Some((a - b).abs() / (*sd)?)) {
+                assert!(sds < 0.1, "{sds}");
+            }
+        }
+        let steps = |all: &[Estimate]| all.iter().map(|e| e.iterations.len()).sum::<usize>();
+        println!("{} steps, {} to 1e-6", steps(&loose), steps(&tight));
+        assert!(steps(&loose) < steps(&tight));
     }
 }
 

@@ -20,9 +20,10 @@ use crate::markers::Recording;
 use crate::math::motion::Motion;
 use crate::math::tensor::subtract;
 use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
-use crate::report::tables::{FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
+use crate::report::tables::{FrameCost, FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
+use std::time::Instant;
 
 /// Fits every frame that is not done, keeps and writes it, prints the page.
 pub(super) fn fit(
@@ -144,12 +145,13 @@ fn pass<'a>(
             break;
         }
         let frame = Frame { index, time_s: recording.frames[index].time_s };
-        let before = fit.work().linear.factorisations;
+        let (start, before) = (Instant::now(), fit.work().linear.factorisations);
         let said;
         let mut numbers = vec![("frame", index as f64), ("frame_time_s", frame.time_s)];
         let ended = match fit.frame(recording, index) {
             Ok(estimate) => {
-                let (steps, factorisations) = (estimate.iterations.len(), fit.work().linear.factorisations - before);
+                let steps = estimate.iterations.len();
+                let factorisations = fit.work().linear.factorisations - before;
                 said = format!(
                     "t {:.3} s: rms {:.3} mm, {steps} steps, {factorisations} factorisations",
                     frame.time_s, estimate.rms_mm
@@ -173,9 +175,12 @@ fn pass<'a>(
                 Ended::Failed(error)
             }
         };
+        let factorisations = fit.work().linear.factorisations - before;
+        let cost = FrameCost { seconds: start.elapsed().as_secs_f64(), factorisations };
         let carried = Carried { fit: fit.memory(), halved: book.estimates.tangent_states() };
         let status = book.tally.running();
         writer.write(move |desk| {
+            desk.record.solved(cost);
             let outcome = ended.write(frame, desk, flags)?;
             checkpoints.save(at, &outcome, &carried)?;
             status.write(&run.folder)?;

@@ -702,7 +702,7 @@ pub enum Error {
     },
     /// The fit of a frame did not converge.
     #[error(
-        "frame {frame}: the fit did not converge in {iterations} iterations ({reason}); last step {step:.1e}, required {required:.1e}"
+        "frame {frame}: the fit did not converge in {iterations} iterations ({reason}); the last step leaves {left:.1e}, required {required:.1e}"
     )]
     FitNotConverged {
         /// Frame of the recording.
@@ -711,9 +711,9 @@ pub enum Error {
         iterations: usize,
         /// Why it ended.
         reason: &'static str,
-        /// Largest change of a control in the last step.
-        step: f64,
-        /// The change at which the fit counts as converged.
+        /// What the last step leaves as `fit.tolerance` counts it.
+        left: f64,
+        /// What may be left.
         required: f64,
     },
     /// What all frames share was not found.

@@ -28,6 +28,8 @@ pub struct FitIteration {
     pub cost: f64,
     /// Largest change of a control, as a part of its range.
     pub step: f64,
+    /// What it leaves, as the tolerance of the fit counts it.
+    pub left: f64,
     /// Trust radius after it.
     pub trust: f64,
     /// Steps that were tried and rejected.

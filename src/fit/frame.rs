@@ -10,7 +10,7 @@ use crate::forward::{Drive, Equilibrium, Solver};
 use crate::math::motion::Motion;
 use crate::mesh::MaterialPoint;
 use argmin::core::{Jacobian, Operator};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 
 /// A marker that the frame shows.
@@ -99,6 +99,10 @@ impl LeastSquares for Aims<'_> {
 }
 
 impl LeastSquares for FrameProblem<'_, '_> {
+    fn renew(&self) {
+        self.inner.borrow_mut().renew = true;
+    }
+
     fn cost(&self, q: &[f64], residuals: &[f64]) -> f64 {
         self.aims.cost(q, residuals)
     }
@@ -114,6 +118,8 @@ struct Inner<'f, 'm> {
     base: Equilibrium,
     /// dx/dq at `base`, once it is known.
     directions: Option<Directions>,
+    /// Whether sensitivities that are kept are not wanted.
+    renew: bool,
     /// The equilibrium last found, if it is another one.
     trial: Option<Equilibrium>,
     /// d(weighted residual)/dq at `base` with the head held, where that is free.
@@ -160,7 +166,7 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
-        let inner = RefCell::new(Inner { solver, base: start, directions, trial: None, held_head: None });
+        let inner = RefCell::new(Inner { solver, base: start, directions, renew: false, trial: None, held_head: None });
         FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, free_head: false, inner }
     }
 
@@ -253,6 +259,14 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         match self.reuse {
             Reuse::Fresh => return,
             Reuse::Frozen => {}
+            Reuse::Adjoint => {
+                for (control, column) in self.unknowns.iter().zip(&mut known.columns) {
+                    let range = Range::of(&model.controls()[*control]);
+                    let [from, to] = [&inner.base, next].map(|at| at.state.controls[*control]);
+                    let stretch = range.even_stretch(from, to);
+                    column.iter_mut().for_each(|d| *d *= stretch);
+                }
+            }
             Reuse::Broyden => {
                 let (before, after) = (model.unknowns(&inner.base.state), model.unknowns(&next.state));
                 let dx: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
@@ -266,9 +280,50 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         inner.directions = Some(known);
     }
 
-    /// Forgets sensitivities that were kept, so that the next derivative is taken anew.
-    fn forget_stale(&self) {
-        self.inner.borrow_mut().directions.take_if(|known| !known.fresh);
+    /// d(weighted residual)/dq with the head held, from dx/dq at the base.
+    fn derivative(&self, inner: &Inner<'_, '_>, columns: &[Vec<f64>]) -> DMatrix<f64> {
+        let points: Vec<MaterialPoint> = self.measured.iter().map(|m| self.markers[m.marker].point).collect();
+        let rates = rates_at(inner.solver.model(), &inner.base.state, self.unknowns, columns, &points);
+        let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
+        for (row, (m, rate)) in self.measured.iter().zip(&rates).enumerate() {
+            j.rows_mut(3 * row, 3).copy_from(&(rate * m.weight));
+        }
+        j
+    }
+
+    /// The same from what is known, if it serves.
+    fn kept(&self, inner: &mut Inner<'_, '_>) -> Result<Option<DMatrix<f64>>> {
+        let Some(known) = inner.directions.take() else { return Ok(None) };
+        let mut j = self.derivative(inner, &known.columns);
+        let serves = known.fresh || self.reuse != Reuse::Adjoint || self.correct(inner, &mut j)?;
+        inner.directions = serves.then_some(known);
+        Ok(serves.then_some(j))
+    }
+
+    /// Gives a kept derivative the exact product with the residuals s as the objective weighs them, and so the exact gradient,
+    /// by one solve (adjoint Broyden update, Schlenkrich, Griewank and Walther 2010):
+    ///   J + s (g - J^T s)^T / |s|^2,   g = J(q)^T s
+    ///
+    /// `false` where that takes a new factor, which serves the whole derivative.
+    fn correct(&self, inner: &mut Inner<'_, '_>, j: &mut DMatrix<f64>) -> Result<bool> {
+        let residuals = self.residuals(inner, &inner.base);
+        let rho = self.aims.objectives.loss.weights(&residuals);
+        let s = DVector::from_fn(residuals.len(), |row, _| rho[row / 3] * residuals[row]);
+        let square = s.norm_squared();
+        if square == 0.0 {
+            return Ok(true);
+        }
+        let mesh = inner.solver.model().mesh();
+        let mut pull = vec![[0.0; 3]; mesh.parameters.len()];
+        for (m, s) in self.measured.iter().zip(s.as_slice().chunks_exact(3)) {
+            mesh.add_force(self.markers[m.marker].point, std::array::from_fn(|i| m.weight * s[i]), &mut pull);
+        }
+        let Some(exact) = inner.solver.pulled_back(&inner.base.state, &pull, self.unknowns)? else {
+            return Ok(false);
+        };
+        let missed = DVector::from_vec(exact) - j.tr_mul(&s);
+        j.ger(1.0 / square, &s, &missed, 1.0);
+        Ok(true)
     }
 
     fn jacobian_at(&self, q: &[f64]) -> Result<DMatrix<f64>> {
@@ -282,22 +337,20 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
             self.carry(inner, &trial);
             inner.base = trial;
         }
-        let directions = match inner.directions.take() {
-            Some(known) => known,
-            None => Directions {
-                columns: sensitivities(self.sensitivity, inner.solver, &inner.base, self.unknowns)?,
-                fresh: true,
-            },
+        let renew = std::mem::take(&mut inner.renew);
+        inner.directions.take_if(|known| renew && !known.fresh);
+        let mut j = match self.kept(inner)? {
+            Some(j) => j,
+            None => {
+                let columns = sensitivities(self.sensitivity, inner.solver, &inner.base, self.unknowns)?;
+                inner.base.negative_modes = inner.solver.negative_modes();
+                let j = self.derivative(inner, &columns);
+                inner.directions = Some(Directions { columns, fresh: true });
+                j
+            }
         };
-        let points: Vec<MaterialPoint> = self.measured.iter().map(|m| self.markers[m.marker].point).collect();
-        let model = inner.solver.model();
-        let rates = rates_at(model, &inner.base.state, self.unknowns, &directions.columns, &points);
-        let mut j = DMatrix::zeros(3 * self.measured.len(), self.unknowns.len());
-        for (row, (m, rate)) in self.measured.iter().zip(&rates).enumerate() {
-            j.rows_mut(3 * row, 3).copy_from(&(rate * m.weight));
-        }
-        inner.directions = Some(directions);
         if self.free_head {
+            let model = inner.solver.model();
             let x = model.current(&inner.base.state);
             let place = |m: &Measured| model.mesh().interpolate(self.markers[m.marker].point, &x);
             let positions: Vec<[f64; 3]> = self.measured.iter().map(place).collect();
@@ -323,11 +376,7 @@ impl Jacobian for FrameProblem<'_, '_> {
     type Param = Vec<f64>;
     type Jacobian = DMatrix<f64>;
 
-    /// After a step: with what is kept. Asked again where it was asked before: anew.
     fn jacobian(&self, q: &Vec<f64>) -> std::result::Result<DMatrix<f64>, argmin::core::Error> {
-        if self.drive(q).controls == self.inner.borrow().base.state.controls {
-            self.forget_stale();
-        }
         self.jacobian_at(q).map_err(Error::into)
     }
 }

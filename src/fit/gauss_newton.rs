@@ -40,6 +40,11 @@ impl Range {
         (from - self.lower + self.onset) * (self.to_even(to) - self.to_even(from))
     }
 
+    /// The ratio of dt/dq at `to` and at `from`: how dx/dq of such a response changes.
+    pub fn even_stretch(&self, from: f64, to: f64) -> f64 {
+        (from - self.lower + self.onset) / (to - self.lower + self.onset)
+    }
+
     fn to_even(self, q: f64) -> f64 {
         ((q - self.lower) / self.onset).ln_1p()
     }
@@ -49,10 +54,66 @@ impl Range {
     }
 }
 
+/// Where a search ends; the step that shows it is still taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Tolerance {
+    /// The largest change of a control in a step, as a part of its range.
+    Change(f64),
+    /// How far the answer may be from the optimum, in standard deviations of it. A step is sqrt(d^T H d) of them long, with the
+    /// second derivative H of the objective: the root of twice what the model promises; where H is in units of a variance that
+    /// is not known, over its root. Steps that shrink by theta leave theta times the last one.
+    Sds {
+        /// So many.
+        sds: f64,
+        /// Whether residuals count by the standard deviations that they have.
+        known: bool,
+    },
+}
+
+/// A step of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Length {
+    /// Largest change of a control, as a part of its range.
+    pub change: f64,
+    /// What the model promises of it.
+    pub promised: f64,
+    /// The objective before it.
+    pub cost: f64,
+    /// How many residuals there are beyond the number of controls.
+    pub surplus: usize,
+}
+
+impl Tolerance {
+    /// What a step leaves that follows one of `before` standard deviations, in the units of [`Tolerance::size`], and its own
+    /// length in standard deviations.
+    pub fn left(self, step: Length, before: Option<f64>) -> (f64, f64) {
+        let Length { change, promised, cost, surplus } = step;
+        let variance = match self {
+            Tolerance::Sds { known: false, .. } => 2.0 * cost / surplus.max(1) as f64,
+            _ => 1.0,
+        };
+        let sds = (2.0 * promised.max(0.0) / variance.max(f64::MIN_POSITIVE)).sqrt();
+        match self {
+            Tolerance::Change(_) => (change, sds),
+            Tolerance::Sds { .. } => (before.map_or(sds, |before| sds * (sds / before).min(1.0)), sds),
+        }
+    }
+
+    /// As a part of a range, or as a number of standard deviations.
+    pub fn size(self) -> f64 {
+        match self {
+            Tolerance::Change(size) | Tolerance::Sds { sds: size, .. } => size,
+        }
+    }
+}
+
 /// What is minimised, seen from residuals.
 pub trait LeastSquares {
     /// The objective at q, where the residuals are these.
     fn cost(&self, q: &[f64], residuals: &[f64]) -> f64;
+
+    /// Makes the problem take its next Jacobian anew, where it keeps them.
+    fn renew(&self) {}
 
     /// Its gradient and a positive semidefinite second derivative by q, where the residuals have the derivative `j`.
     fn model(&self, q: &[f64], residuals: &[f64], j: &DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>);
@@ -61,12 +122,13 @@ pub trait LeastSquares {
 /// The solver.
 pub struct GaussNewton {
     ranges: Vec<Range>,
-    /// Largest change of a control, as a part of its range, at which the fit counts as converged.
-    tolerance: f64,
+    tolerance: Tolerance,
     /// Largest change of t in one step.
     trust: f64,
-    /// Largest change of a control in the last step, as a part of its range.
-    step: f64,
+    /// Whether the last step was short enough to be the last.
+    converged: bool,
+    /// Its length in standard deviations of the answer.
+    last_sds: Option<f64>,
     /// Whether the problem keeps Jacobians from step to step.
     keeps: bool,
     /// Whether the Jacobian at hand was taken where it is used.
@@ -82,18 +144,22 @@ const SMALLEST_TRUST: f64 = 1e-10;
 /// Rejected steps after which a Jacobian that was kept is taken anew, and the least trust region then.
 const REJECTED_WITH_KEPT: u64 = 2;
 const KEPT_TRUST: f64 = 0.1;
+/// Part of what the model promised that a step must bring for its Jacobian to be kept.
+const KEPT_RATIO: f64 = 0.9;
+/// Longest step, as a change of t, behind which a Jacobian is kept.
+const KEPT_STEP: f64 = 0.3;
 /// Part of the largest curvature that holds controls still which no marker sees.
 const STILL: f64 = 1e-11;
 
 impl GaussNewton {
     /// For controls with the given ranges.
-    pub fn new(ranges: Vec<Range>, tolerance: f64) -> GaussNewton {
-        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, step: f64::INFINITY, keeps: false, fresh: true }
+    pub fn new(ranges: Vec<Range>, tolerance: Tolerance) -> GaussNewton {
+        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, converged: false, last_sds: None, keeps: false, fresh: true }
     }
 
-    /// For a problem whose Jacobian after a step may be one that it kept; asked again at the same place it is taken anew.
+    /// For a problem that keeps Jacobians until it is told to renew them.
     pub fn with_kept_jacobians(self) -> GaussNewton {
-        GaussNewton { keeps: true, ..self }
+        GaussNewton { keeps: true, fresh: false, ..self }
     }
 }
 
@@ -150,16 +216,19 @@ where
             let d = bounded_step(&h, g.as_slice(), &lower, &upper)?;
             let trial: Vec<f64> = (0..n).map(|k| self.ranges[k].at_even(t[k] + d[k])).collect();
             let part = |((a, b), r): ((&f64, &f64), &Range)| (a - b).abs() / (r.upper - r.lower);
-            self.step = trial.iter().zip(&q).zip(&self.ranges).map(part).fold(0.0, f64::max);
+            let step = trial.iter().zip(&q).zip(&self.ranges).map(part).fold(0.0, f64::max);
             let d = DVector::from_vec(d);
             let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));
-            let last = self.step <= self.tolerance;
+            let length = Length { change: step, promised, cost: before, surplus: r.len().saturating_sub(n) };
+            let (left, sds) = self.tolerance.left(length, self.last_sds);
+            let last = left <= self.tolerance.size();
             if !self.fresh && (last || rejected == REJECTED_WITH_KEPT) {
                 // neither rest nor failure is believed before the derivative was taken here
+                renew(problem)?;
                 let jacobian = jacobian(problem, &q)?;
-                (self.fresh, self.step, self.trust) = (true, f64::INFINITY, self.trust.max(KEPT_TRUST));
+                (self.fresh, self.trust) = (true, self.trust.max(KEPT_TRUST));
                 let gradient = model(problem, &q, &r, &jacobian)?.0;
-                let report = kv!("step" => 0.0; "trust" => self.trust; "rejected" => rejected;);
+                let report = kv!("step" => 0.0; "left" => left; "trust" => self.trust; "rejected" => rejected;);
                 let state = state.param(q).residuals(r).jacobian(jacobian).gradient(gradient).cost(before);
                 return Ok((state, Some(report)));
             }
@@ -183,10 +252,15 @@ where
                     self.trust = (0.5 * d.amax()).max(SMALLEST_TRUST);
                 }
                 let residuals = outcome?;
+                let served = last || (ratio > KEPT_RATIO && d.amax() < KEPT_STEP && rejected == 0);
+                if self.keeps && !served {
+                    renew(problem)?;
+                }
                 let jacobian = jacobian(problem, &trial)?;
-                self.fresh = !self.keeps;
+                self.fresh = !(self.keeps && served);
                 let gradient = model(problem, &trial, &residuals, &jacobian)?.0;
-                let report = kv!("step" => self.step; "trust" => self.trust; "rejected" => rejected;);
+                (self.converged, self.last_sds) = (last, Some(sds));
+                let report = kv!("step" => step; "left" => left; "trust" => self.trust; "rejected" => rejected;);
                 let state = state.param(trial).residuals(residuals).jacobian(jacobian).gradient(gradient).cost(after);
                 return Ok((state, Some(report)));
             }
@@ -201,7 +275,7 @@ where
     }
 
     fn terminate(&mut self, _state: &GaussNewtonState) -> TerminationStatus {
-        if self.step <= self.tolerance {
+        if self.converged {
             TerminationStatus::Terminated(TerminationReason::SolverConverged)
         } else {
             TerminationStatus::NotTerminated
@@ -225,6 +299,13 @@ where
 
 fn is_not_converged(error: &ArgminError) -> bool {
     error.downcast_ref::<Error>().is_some_and(Error::is_not_converged)
+}
+
+fn renew<O: LeastSquares>(problem: &mut Problem<O>) -> Result<(), ArgminError> {
+    problem.problem("renewals", |p| {
+        p.renew();
+        Ok(())
+    })
 }
 
 fn cost<O: LeastSquares>(problem: &mut Problem<O>, q: &[f64], residuals: &[f64]) -> Result<f64, ArgminError> {

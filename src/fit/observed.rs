@@ -27,7 +27,13 @@ impl Observe<GaussNewtonState> for Log {
         let number = |key: &str| kv.get(key).and_then(|v| v.get_float()).unwrap_or(f64::NAN);
         let rejected = kv.get("rejected").and_then(|v| v.get_uint()).unwrap_or(0);
         let iteration =
-            FitIteration { cost: state.get_cost(), step: number("step"), trust: number("trust"), rejected };
+FitIteration {
+            cost: state.get_cost(),
+            step: number("step"),
+            left: number("left"),
+            trust: number("trust"),
+            rejected,
+        };
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(iteration);
         Ok(())
     }

@@ -29,6 +29,9 @@ pub enum Reuse {
     Frozen,
     /// They are kept but for what the step shows: D + (dx - D dq) dq^T / |dq|^2 (Broyden 1965).
     Broyden,
+    /// They are kept as a response keeps them that is even in t = ln(1 + (q - lower) / onset), and the gradient is exact at
+    /// every step: by one solve with the transposed tangent. Only with [`Sensitivity::Tangent`].
+    Adjoint,
 }
 
 /// How much tighter than a fit's own equilibria those of finite differences are solved.

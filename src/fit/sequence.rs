@@ -4,7 +4,7 @@ use super::covariance::{Bound, standard_deviations};
 use super::estimate::{Estimate, Memory, Optimum};
 use super::frame::{Aims, Directions, FrameProblem, Measured};
 use super::free_head;
-use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range};
+use super::gauss_newton::{GaussNewton, GaussNewtonState, LeastSquares, Range, Tolerance};
 use super::head_error::{HeadError, taken};
 use super::identifiability::Evidence;
 use super::objective::loss::Loss;
@@ -18,7 +18,7 @@ use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
 use crate::mesh::MaterialPoint;
 use crate::model::{Control, Model, State};
-use crate::scene::{ControlValue, Curves, FitSpec, HeadSpec, ReuseSpec, Scene, SensitivitySpec};
+use crate::scene::{ControlValue, Curves, FitSpec, FitToleranceSpec, HeadSpec, ReuseSpec, Scene, SensitivitySpec};
 use argmin::core::observers::ObserverMode;
 use argmin::core::{Executor, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DMatrix;
@@ -38,7 +38,7 @@ pub struct Fit<'m> {
     pub(super) held_curves: Vec<HeldCurve>,
     pub(super) sensitivity: Sensitivity,
     pub(super) reuse: Reuse,
-    pub(super) tolerance: f64,
+    pub(super) tolerance: Tolerance,
     pub(super) max_iterations: usize,
     pub(super) objectives: Objectives,
     /// Frames that were fitted, the last one first.
@@ -87,8 +87,9 @@ impl<'m> Fit<'m> {
             SensitivitySpec::Tangent => Sensitivity::Tangent,
             SensitivitySpec::FiniteDifference => Sensitivity::FiniteDifference { step: fit.finite_difference_step },
         };
+        let known_sd = markers.iter().all(|m| m.sd.is_some());
         Ok(Fit {
-            known_sd: markers.iter().all(|m| m.sd.is_some()),
+            known_sd,
             free_head: fit.registration.head == HeadSpec::Estimate,
             solver,
             markers,
@@ -97,11 +98,17 @@ impl<'m> Fit<'m> {
             held_curves,
             sensitivity,
             reuse: match fit.reuse {
+                // finite differences are for those who do not trust a tangent
+                ReuseSpec::Adjoint if fit.sensitivity == SensitivitySpec::FiniteDifference => Reuse::Fresh,
                 ReuseSpec::Fresh => Reuse::Fresh,
                 ReuseSpec::Frozen => Reuse::Frozen,
                 ReuseSpec::Broyden => Reuse::Broyden,
+                ReuseSpec::Adjoint => Reuse::Adjoint,
             },
-            tolerance: fit.tolerance,
+            tolerance: match fit.tolerance {
+                FitToleranceSpec::Change(part) => Tolerance::Change(part),
+                FitToleranceSpec::Sds(sds) => Tolerance::Sds { sds, known: known_sd },
+            },
             max_iterations: fit.max_iterations,
             objectives,
             before: Vec::new(),
@@ -199,8 +206,7 @@ impl<'m> Fit<'m> {
         let (measured_mm, measured) = self.shown(recording, frame)?;
         let problem = self.problem(recording.frames[frame].time_s, measured.clone());
         let residuals = problem.apply(&q).map_err(own_error)?;
-        // asked again at the same place it is taken anew, if it was kept from another
-        problem.jacobian(&q).map_err(own_error)?;
+        problem.renew();
         let jacobian = problem.jacobian(&q).map_err(own_error)?;
         let held_head = problem.take_held_head();
         let (equilibrium, directions) = problem.into_equilibrium();
@@ -362,8 +368,8 @@ impl<'m> Fit<'m> {
                 frame,
                 iterations: iterations.len(),
                 reason: reason.unwrap_or("the optimiser lost its state"),
-                step: iterations.last().map_or(f64::INFINITY, |i| i.step),
-                required: tolerance,
+                left: iterations.last().map_or(f64::INFINITY, |i| i.left),
+                required: tolerance.size(),
             }),
         }
     }

@@ -11,6 +11,7 @@ mod heads;
 
 use super::bounded_step::bounded_step_in_chain;
 use super::covariance::{Bound, standard_deviations};
+use super::gauss_newton::Length;
 use super::estimate::{Estimate, FitIteration, Optimum};
 use super::frame::{Aims, FrameProblem, Measured};
 use super::objective::Sum;
@@ -85,7 +86,7 @@ impl<'m> Fit<'m> {
             self.unknowns.iter().zip(sizes).map(|(k, size)| self.controls()[*k].onset / size).collect()
         };
         let mut cost = self.cost(&nodes, &links);
-        let (mut trust, mut rejected, mut sweeps) = (FIRST_TRUST, 0_u64, Vec::new());
+        let (mut trust, mut rejected, mut sweeps, mut before) = (FIRST_TRUST, 0_u64, Vec::new(), None);
         let (mut gradient, mut hessian) = self.model(&nodes, &links, &chain);
         loop {
             if stop() {
@@ -97,9 +98,12 @@ impl<'m> Fit<'m> {
             let upper: Vec<f64> = (0..a.len()).map(|i| (1.0 - a[i]).min(radius(i))).collect();
             let d = bounded_step_in_chain(&hessian, &gradient, &lower, &upper)?;
             let step = d.iter().map(|d| d.abs()).fold(0.0, f64::max);
-            let last = step <= self.tolerance;
             let curved: f64 = hessian.times(&d).iter().zip(&d).map(|(h, d)| h * d).sum();
+            let residuals: usize = nodes.iter().filter_map(|node| Some(node.at.as_ref()?.residuals.len())).sum();
             let promised = -(gradient.iter().zip(&d).map(|(g, d)| g * d).sum::<f64>() + 0.5 * curved);
+            let length = Length { change: step, promised, cost, surplus: residuals.saturating_sub(a.len()) };
+            let (left, sds) = self.tolerance.left(length, before);
+            let last = left <= self.tolerance.size();
             let trial: Vec<f64> = (0..a.len())
                 .map(|i| match d[i] {
                     // on a bound, not near it
@@ -131,7 +135,8 @@ impl<'m> Fit<'m> {
                     ratio if ratio < 0.25 => trust *= 0.5,
                     _ => {}
                 }
-                sweeps.push(FitIteration { cost, step, trust, rejected });
+                before = Some(sds);
+                sweeps.push(FitIteration { cost, step, left, trust, rejected });
                 rejected = 0;
                 if last {
                     break;
@@ -146,8 +151,8 @@ impl<'m> Fit<'m> {
                     frame: nodes[worst / chain.controls.max(1)].frame,
                     iterations: sweeps.len(),
                     reason: "the sweeps over the clip were used up",
-                    step,
-                    required: self.tolerance,
+                    left,
+                    required: self.tolerance.size(),
                 });
             }
         }

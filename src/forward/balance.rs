@@ -2,7 +2,7 @@
 
 use super::{Drive, Work, seconds_since};
 use crate::error::{Error, Result};
-use crate::math::factor::{self, Factor, Precision};
+use crate::math::factor::{self, Factor, Precision, SolveQuality};
 use crate::math::sparse::SymmetricMatrix;
 use crate::math::tensor::{norm, subtract};
 use crate::model::{Evaluation, Model, OffSurface, State, Tangent, Workspace, WorstPoint};
@@ -15,9 +15,10 @@ use std::time::Instant;
 const ROUNDING: f64 = 1e-13;
 /// Relative residual of a Newton step.
 const STEP_TOLERANCE: f64 = 1e-10;
-/// Relative residual that a solve with the tangent of an equilibrium must reach, and what it strives for.
-const TANGENT_REQUIRED: f64 = 1e-9;
-const TANGENT_TOLERANCE: f64 = 1e-13;
+/// Of solves with the tangent of an equilibrium.
+const TANGENT: Accuracy = Accuracy { required: 1e-9, tolerance: 1e-13 };
+/// Of the solve for a gradient, which a search only follows.
+const GRADIENT: Accuracy = Accuracy { required: 1e-7, tolerance: 1e-7 };
 /// What of B x may remain of the B x without constraint forces, and the iterations for it.
 const CONSTRAINT_TOLERANCE: f64 = 1e-9;
 const CONSTRAINT_ITERATIONS: usize = 500;
@@ -26,6 +27,18 @@ const CONSTRAINT_ITERATIONS: usize = 500;
 const STALE_COLUMNS: usize = 12;
 /// Sweeps after which a stale factor is not worth keeping.
 const STALE_SWEEPS: usize = 12;
+/// Relative residual of a Newton step by a stale factor and of the corrections that judge it, and the sweeps after which a new
+/// factor is cheaper: on two threads a factorisation takes as long as ten solves.
+const STALE_STEP: f64 = 2e-2;
+const STALE_CORRECTION: f64 = 0.1;
+const STALE_STEP_SWEEPS: usize = 8;
+
+/// Relative residual that a solve must reach, and what it strives for.
+#[derive(Clone, Copy)]
+struct Accuracy {
+    required: f64,
+    tolerance: f64,
+}
 
 /// A model with the memory to solve it.
 pub(super) struct Balance<'m> {
@@ -36,6 +49,8 @@ pub(super) struct Balance<'m> {
     tangent: Tangent,
     factor: Factor,
     factored: bool,
+    /// Whether Newton's steps may be made with a factor that is older than their tangent.
+    pub keeps_factor: bool,
     /// Where the tangent was assembled last, and where the one that is factorised was.
     assembled_at: Option<State>,
     factored_at: Option<State>,
@@ -94,6 +109,7 @@ impl<'m> Balance<'m> {
             tangent: model.tangent(),
             factor: Factor::new(model.symbolic().clone(), precision)?,
             factored: false,
+            keeps_factor: false,
             assembled_at: None,
             factored_at: None,
             earlier: factor::Work::default(),
@@ -179,8 +195,42 @@ impl<'m> Balance<'m> {
             rhs.extend(force.iter().map(|f| -f));
         }
         let moved = controls.iter().map(|control| model.constraint_control_rate(state, *control)).collect();
-        self.solve_held(state, &mut rhs, moved)?;
+        self.solve_held(state, &mut rhs, moved, TANGENT)?;
         Ok(rhs)
+    }
+
+    /// d(b . du)/d(control) at the equilibrium `state` for a force b on all displacement parameters, du/d(control) being that of
+    /// [`Balance::rates`]: one solve for all controls. `None` where the factor at hand is too old for it: a new one serves all
+    /// the rates.
+    ///
+    ///   K l + B^T z = b_f,  B l = 0:   b . du/dq = l . (- dr/dq - K_fp du_p/dq) - z . c + b_p . du_p/dq
+    pub fn pulled_back(
+        &mut self,
+        state: &State,
+        pull: &[[f64; 3]],
+        controls: &[usize],
+    ) -> Result<Option<Vec<f64>>> {
+        let model = self.model;
+        let mut adjoint = model.force_of_unknowns(pull);
+        self.evaluate(state, Want::Stiffness, None);
+        self.assemble(state);
+        if !self.solve_with_factor_at_hand(&mut adjoint, 1, GRADIENT)? {
+            return Ok(None);
+        }
+        let multipliers = self.hold_constraints(state, &mut adjoint, None, GRADIENT)?;
+        let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+        let along = |control: &usize| {
+            let mut rate = -dot(&adjoint, &model.control_force(state, *control));
+            if let Some(moved) = model.supports().rate(model.mesh(), *control, &state.controls) {
+                let lifted = self.evaluate(state, Want::Stiffness, Some(&moved)).lifted;
+                rate += dot(pull.as_flattened(), moved.as_flattened()) - dot(&adjoint, &lifted);
+            }
+            if let Some(moved) = model.constraint_control_rate(state, *control) {
+                rate -= multipliers.iter().zip(&moved).map(|(z, c)| dot(z, c)).sum::<f64>();
+            }
+            rate
+        };
+        Ok(Some(controls.iter().map(along).collect()))
     }
 
     /// Undamped Newton steps from a state with all prescribed motion done, with constraints as open or closed as they are:
@@ -191,7 +241,7 @@ impl<'m> Balance<'m> {
         let mut residual = self.evaluate(&state, Want::Force, None).residual;
         for _ in 0..most {
             let mut step: Vec<f64> = residual.iter().map(|r| -r).collect();
-            self.solve_held(&state, &mut step, vec![None])?;
+            self.solve_held(&state, &mut step, vec![None], TANGENT)?;
             self.model.advance(&mut state, &step, 1.0);
             self.work.iterations += 1;
             let after = self.evaluate(&state, Want::Force, None);
@@ -258,25 +308,38 @@ impl<'m> Balance<'m> {
     }
 
     pub fn solve_with_tangent(&mut self, state: &State, rhs: &mut [f64], columns: usize) -> Result<()> {
-        self.solve_held(state, rhs, vec![None; columns])
+        self.solve_held(state, rhs, vec![None; columns], TANGENT).map(|_| ())
     }
 
     /// One column of `rhs` for each entry of `moved`: the rate c of the gaps that comes with it, if there is one.
-    fn solve_held(&mut self, state: &State, rhs: &mut [f64], moved: Vec<Option<Vec<Vec<f64>>>>) -> Result<()> {
+    /// Gives the forces z of the constraints, for each column; none where nothing is constrained.
+    fn solve_held(
+        &mut self,
+        state: &State,
+        rhs: &mut [f64],
+        moved: Vec<Option<Vec<Vec<f64>>>>,
+        accuracy: Accuracy,
+    ) -> Result<Vec<Vec<Vec<f64>>>> {
         self.evaluate(state, Want::Stiffness, None);
         self.assemble(state);
-        self.solve_assembled(rhs, moved.len())?;
-        if state.multipliers.iter().all(Vec::is_empty) {
-            return Ok(());
-        }
+        self.solve_assembled(rhs, moved.len(), accuracy)?;
         let n = self.model.numbering().unknowns();
         let columns = rhs.chunks_exact_mut(n.max(1)).zip(moved);
-        columns.into_iter().try_for_each(|(x, moved)| self.hold_constraints(state, x, moved))
+        columns.into_iter().map(|(x, moved)| self.hold_constraints(state, x, moved, accuracy)).collect()
     }
 
     /// From K^-1 b to the x of K x + B^T z = b, B x = - c: conjugate gradients on B K^-1 B^T z = B K^-1 b + c. The operator
-    /// is positive on the range of B, and K holds the penalty, which gathers its eigenvalues below 1 / penalty.
-    fn hold_constraints(&mut self, state: &State, x: &mut [f64], moved: Option<Vec<Vec<f64>>>) -> Result<()> {
+    /// is positive on the range of B, and K holds the penalty, which gathers its eigenvalues below 1 / penalty. Gives z.
+    fn hold_constraints(
+        &mut self,
+        state: &State,
+        x: &mut [f64],
+        moved: Option<Vec<Vec<f64>>>,
+        accuracy: Accuracy,
+    ) -> Result<Vec<Vec<f64>>> {
+        if state.multipliers.iter().all(Vec::is_empty) {
+            return Ok(Vec::new());
+        }
         let model = self.model;
         let product = |a: &[Vec<f64>], b: &[Vec<f64>]| -> f64 {
             a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
@@ -292,17 +355,19 @@ impl<'m> Balance<'m> {
             add(&mut residual, 1.0, &moved);
         }
         let mut direction = residual.clone();
+        let mut forces: Vec<Vec<f64>> = residual.iter().map(|of_term| vec![0.0; of_term.len()]).collect();
         let mut square = product(&residual, &residual);
         for _ in 0..CONSTRAINT_ITERATIONS {
             if square <= CONSTRAINT_TOLERANCE * CONSTRAINT_TOLERANCE * first || first == 0.0 {
-                return Ok(());
+                return Ok(forces);
             }
             let mut moved = model.constraint_force(state, &direction);
-            self.solve_assembled(&mut moved, 1)?;
+            self.solve_assembled(&mut moved, 1, accuracy)?;
             let response = model.constraint_rate(state, &moved);
             let along = square / product(&direction, &response);
             x.iter_mut().zip(&moved).for_each(|(x, m)| *x -= along * m);
             add(&mut residual, -along, &response);
+            add(&mut forces, along, &direction);
             let next = product(&residual, &residual);
             direction.iter_mut().flatten().for_each(|d| *d *= next / square);
             add(&mut direction, 1.0, &residual);
@@ -312,23 +377,28 @@ impl<'m> Balance<'m> {
     }
 
     /// K x = b with the tangent that is assembled; the last factor is kept where it still serves.
-    fn solve_assembled(&mut self, rhs: &mut [f64], columns: usize) -> Result<()> {
-        let original = rhs.to_vec();
-        let same = Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern());
-        if self.factored && same && columns <= STALE_COLUMNS {
-            let quality = self.factor.solve(&self.tangent.matrix, rhs, columns, TANGENT_TOLERANCE)?;
-            if quality.residual <= TANGENT_REQUIRED && quality.sweeps <= STALE_SWEEPS {
-                return Ok(());
-            }
-            rhs.copy_from_slice(&original);
+    fn solve_assembled(&mut self, rhs: &mut [f64], columns: usize, accuracy: Accuracy) -> Result<()> {
+        if self.solve_with_factor_at_hand(rhs, columns, accuracy)? {
+            return Ok(());
         }
         self.refactor()?;
-        let quality = self.factor.solve(&self.tangent.matrix, rhs, columns, TANGENT_TOLERANCE)?;
-        if quality.residual <= TANGENT_REQUIRED {
-            Ok(())
-        } else {
-            Err(Error::InaccurateSolve { residual: quality.residual, required: TANGENT_REQUIRED })
+        let residual = self.factor.solve(&self.tangent.matrix, rhs, columns, accuracy.tolerance)?.residual;
+        let required = accuracy.required;
+        if residual <= required { Ok(()) } else { Err(Error::InaccurateSolve { residual, required }) }
+    }
+
+    /// The same with the last factor, if there is one and it serves; if not, `rhs` stays as it is.
+    fn solve_with_factor_at_hand(&mut self, rhs: &mut [f64], columns: usize, accuracy: Accuracy) -> Result<bool> {
+        if !self.factored || columns > STALE_COLUMNS {
+            return Ok(false);
         }
+        let original = rhs.to_vec();
+        let quality = self.factor.solve_within(&self.tangent.matrix, rhs, columns, accuracy.tolerance, STALE_SWEEPS)?;
+        let serves = quality.residual <= accuracy.required;
+        if !serves {
+            rhs.copy_from_slice(&original);
+        }
+        Ok(serves)
     }
 
     fn evaluate(&mut self, state: &State, want: Want, gap: Option<&[[f64; 3]]>) -> Evaluation {
@@ -367,7 +437,7 @@ impl<'m> Balance<'m> {
 
     fn refactor(&mut self) -> Result<()> {
         self.factored = false;
-        if !Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern()) {
+        if !self.has_pattern_of_factor() {
             self.earlier += self.factor.work();
             self.factor = Factor::new(self.model.symbolic_of(&self.tangent)?, self.precision)?;
         }
@@ -375,6 +445,26 @@ impl<'m> Balance<'m> {
         self.factored_at.clone_from(&self.assembled_at);
         self.factored = true;
         Ok(())
+    }
+
+    fn has_pattern_of_factor(&self) -> bool {
+        Arc::ptr_eq(&self.tangent.matrix.pattern, self.factor.symbolic().pattern())
+    }
+
+    /// K d = - (r + K g) with the motion g that is still outstanding, a part of what it was when K was made; with a factor
+    /// older than K to the relative residual `stale`.
+    fn solve_step(&mut self, stale: f64) -> Result<(Direction, SolveQuality)> {
+        let mut unknowns: Vec<f64> = self.residual.iter().map(|r| -r).collect();
+        if let (Some(gap), Some(first), Some(lifted)) = (&self.gap, &self.lifted_gap, &self.lifted) {
+            let part = remaining(gap, first);
+            unknowns.iter_mut().zip(lifted).for_each(|(d, k)| *d -= part * k);
+        }
+        let matrix = &self.tangent.matrix;
+        let quality = match self.factored_at != self.assembled_at {
+            true => self.factor.solve_within(matrix, &mut unknowns, 1, stale, STALE_STEP_SWEEPS)?,
+            false => self.factor.solve(matrix, &mut unknowns, 1, STEP_TOLERANCE)?,
+        };
+        Ok((Direction { unknowns, gap: self.gap.clone() }, quality))
     }
 
     /// Prescribed motion that a state still lacks, per parameter; `None` when nothing is outstanding.
@@ -435,20 +525,19 @@ impl Equations for Balance<'_> {
         self.lifted = gap.as_ref().map(|_| evaluation.lifted);
         self.lifted_gap = gap.clone();
         self.gap = gap;
-        self.refactor()?;
         self.work.iterations += 1;
+        if self.keeps_factor && self.factored {
+            let (step, quality) = self.solve_step(STALE_STEP)?;
+            if quality.residual <= STALE_STEP {
+                return Ok(step);
+            }
+        }
+        self.refactor()?;
         self.correction()
     }
 
-    /// K d = - (r + K g) with the motion g that is still outstanding, a part of what it was when K was made.
     fn correction(&mut self) -> Result<Direction> {
-        let mut unknowns: Vec<f64> = self.residual.iter().map(|r| -r).collect();
-        if let (Some(gap), Some(first), Some(lifted)) = (&self.gap, &self.lifted_gap, &self.lifted) {
-            let part = remaining(gap, first);
-            unknowns.iter_mut().zip(lifted).for_each(|(d, k)| *d -= part * k);
-        }
-        self.factor.solve(&self.tangent.matrix, &mut unknowns, 1, STEP_TOLERANCE)?;
-        Ok(Direction { unknowns, gap: self.gap.clone() })
+        Ok(self.solve_step(if self.keeps_factor { STALE_CORRECTION } else { STALE_STEP })?.0)
     }
 
     fn advance(&self, state: &State, step: &Direction, factor: f64) -> State {

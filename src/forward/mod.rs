@@ -214,7 +214,10 @@ impl<'m> Solver<'m> {
             }
         }
         let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), ..LIMITS };
-        if let Ok(outcome) = self.solve(guess, limits) {
+        self.balance.keeps_factor = true;
+        let near = self.solve(guess, limits);
+        self.balance.keeps_factor = false;
+        if let Ok(outcome) = near {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
             if outcome.stop.is_none() && stable {
                 let history = vec![step(1.0, StepKind::Walked, outcome.last, outcome.iterations)];
@@ -564,6 +567,26 @@ impl<'m> Solver<'m> {
     pub fn rates(&mut self, state: &State, controls: &[usize]) -> Result<Vec<Vec<f64>>> {
         let n = self.model().numbering().unknowns();
         Ok(self.balance.rates(state, controls)?.chunks_exact(n.max(1)).map(<[f64]>::to_vec).collect())
+    }
+
+    /// d(b . du)/d(control) for the forces b on all displacement parameters and each of `controls`: the pull-back of
+    /// [`Solver::rates`] with the motion of faces on bones, by one solve for all controls (the adjoint of the tangent). `None`
+    /// where the factor at hand is too old for it: a new one serves all the rates.
+    ///
+    /// # Errors
+    /// As [`Solver::solve_with_tangent`].
+    pub fn pulled_back(
+        &mut self,
+        state: &State,
+        pull: &[[f64; 3]],
+        controls: &[usize],
+    ) -> Result<Option<Vec<f64>>> {
+        self.balance.pulled_back(state, pull, controls)
+    }
+
+    /// Negative modes at the last factorisation: see [`Equilibrium::negative_modes`].
+    pub fn negative_modes(&self) -> Option<usize> {
+        self.balance.negative_modes()
     }
 }
 

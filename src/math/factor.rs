@@ -211,14 +211,14 @@ impl Factor {
 
     /// Solves A X = B for `columns` right-hand sides stored one after the other in `rhs`, in place.
     ///
-    /// `a` may be newer than the factored matrix: the factor is then a preconditioner. Sweeps go on until the relative
-    /// residual of every column is at most `tolerance` or no longer falls; see [`SolveQuality`].
+    /// `a` may be newer than the factored matrix, and of another pattern: the factor is then a preconditioner. Sweeps go on
+    /// until the relative residual of every column is at most `tolerance` or no longer falls; see [`SolveQuality`].
     ///
     /// # Errors
     /// [`Error::NotFinite`] if `a` or `rhs` holds NaN or infinity, [`Error::NotFactored`] without a valid factor.
     ///
     /// # Panics
-    /// If `a` has another pattern or `rhs` is not n times `columns` long.
+    /// If `a` has another order or `rhs` is not n times `columns` long.
     pub fn solve(
         &mut self,
         a: &SymmetricMatrix,
@@ -226,14 +226,30 @@ impl Factor {
         columns: usize,
         tolerance: f64,
     ) -> Result<SolveQuality> {
+        self.solve_within(a, rhs, columns, tolerance, refine::MOST_SWEEPS)
+    }
+
+    /// The same with no more than so many sweeps: for a factor that is old.
+    ///
+    /// # Errors
+    /// # Panics
+    /// As [`Factor::solve`].
+    pub fn solve_within(
+        &mut self,
+        a: &SymmetricMatrix,
+        rhs: &mut [f64],
+        columns: usize,
+        tolerance: f64,
+        sweeps: usize,
+    ) -> Result<SolveQuality> {
         let start = Instant::now();
-        assert!(Arc::ptr_eq(&a.pattern, &self.symbolic.pattern), "the matrix has the pattern of the factor");
+        assert!(a.pattern.n() == self.symbolic.pattern.n(), "the matrix has the order of the factor");
         assert!(rhs.len() == self.symbolic.pattern.n() * columns, "n x columns numbers");
         if !self.is_valid {
             return Err(Error::NotFactored);
         }
         let weights: Vec<f64> = self.scale.iter().map(|s| s * s).collect();
-        let quality = refine::solve(a, |x| self.precondition(x), &weights, rhs, columns, tolerance)?;
+        let quality = refine::solve(a, |x| self.precondition(x), &weights, rhs, columns, (tolerance, sweeps))?;
         self.work.solves += columns;
         self.work.sweeps += quality.sweeps;
         self.work.solve_time += start.elapsed();

@@ -14,14 +14,21 @@ use super::factor::SolveQuality;
 use super::sparse::SymmetricMatrix;
 use crate::{Error, Result};
 
-/// Most solves with the factor in one call; a factor that needs more is no use.
-const MOST_SOLVES: usize = 40;
+/// Most solves with the factor after the first one in one call; a factor that needs more is no use.
+pub(super) const MOST_SWEEPS: usize = 39;
 /// Earlier steps that are kept: memory is 2 x 16 vectors per right-hand side at most.
 const KEPT_STEPS: usize = 16;
 /// Refinement stops when a sweep leaves more than this part of every residual above the tolerance.
 const LEAST_FALL: f64 = 0.9;
+/// Residuals above this are no rounding. They may stand still while the steps collect what a stale factor has wrong: a kink
+/// that opened or closed takes a step or two; so many sweeps.
+const NO_ROUNDING: f64 = 1e-6;
+const STANDSTILL: usize = 4;
+/// A residual above this after half of the sweeps will not come down in the other half.
+const HOPELESS: f64 = 0.3;
 
-/// Solves A X = B in place of `rhs` with `precondition`, x <- M^-1 x, so that |b - A x| <= `tolerance` |b| per column.
+/// Solves A X = B in place of `rhs` with `precondition`, x <- M^-1 x, so that |b - A x| <= `tolerance` |b| per column, with
+/// no more than so many sweeps after the first solve.
 ///
 /// Norms and products are weighted: <a, b> = sum of w_i a_i b_i.
 pub(super) fn solve(
@@ -30,7 +37,7 @@ pub(super) fn solve(
     weights: &[f64],
     rhs: &mut [f64],
     columns: usize,
-    tolerance: f64,
+    (tolerance, sweeps): (f64, usize),
 ) -> Result<SolveQuality> {
     let n = weights.len();
     let mut quality = SolveQuality { residual: 0.0, sweeps: 0 };
@@ -53,7 +60,8 @@ pub(super) fn solve(
     x.fill(0.0);
     let mut residuals = relative(&sizes);
     let mut steps: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
-    for solves in 0..MOST_SOLVES {
+    let mut still = 0;
+    for solves in 0..=sweeps {
         if residuals.iter().all(|&residual| residual <= tolerance) {
             break;
         }
@@ -91,7 +99,12 @@ pub(super) fn solve(
         quality.sweeps = solves;
         let falls = new.iter().zip(&residuals).any(|(new, old)| *new > tolerance && *new <= LEAST_FALL * old);
         residuals = new;
-        if !falls {
+        still = if falls { 0 } else { still + 1 };
+        let hopeless = solves == sweeps / 2 && residuals.iter().any(|residual| *residual > HOPELESS);
+        if hopeless {
+            break;
+        }
+        if still > 0 && (still > STANDSTILL || residuals.iter().all(|residual| *residual <= NO_ROUNDING)) {
             break;
         }
         if steps.len() == KEPT_STEPS {

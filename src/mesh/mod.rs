@@ -133,6 +133,19 @@ impl Mesh {
         sum
     }
 
+    /// Adds to the forces on the global parameters what `force` at a material point does on them: the transpose of
+    /// [`Mesh::interpolate`].
+    pub fn add_force(&self, at: MaterialPoint, force: Vector, global: &mut [Vector]) {
+        let values = self.element.values(at.xi);
+        for (a, n) in values.iter().enumerate().take(self.element.functions()) {
+            for t in self.map.terms(at.element, a) {
+                for (g, f) in global[t.global as usize].iter_mut().zip(force) {
+                    *g += n * t.scale * f;
+                }
+            }
+        }
+    }
+
     /// Reference position of a material point, mm.
     pub fn position(&self, at: MaterialPoint) -> Vector {
         self.interpolate(at, &self.parameters)

@@ -462,6 +462,19 @@ impl Model {
             .collect()
     }
 
+    /// A force on all displacement parameters as one on the unknowns: the transpose of [`Model::displacement_of`].
+    pub fn force_of_unknowns(&self, force: &[[f64; 3]]) -> Vec<f64> {
+        let mut of_unknowns = vec![0.0; self.numbering.unknowns()];
+        for (parameter, force) in force.iter().enumerate() {
+            for (component, f) in force.iter().enumerate() {
+                if let Some(unknown) = self.numbering.displacement_unknown(parameter, component) {
+                    of_unknowns[unknown] += f;
+                }
+            }
+        }
+        of_unknowns
+    }
+
     fn parts(&self) -> Parts<'_> {
         let Ingredients { mesh, terms, .. } = &self.ingredients;
         Parts { mesh, terms, numbering: &self.numbering, plan: &self.plan }

@@ -7,7 +7,7 @@ use super::frame::{
 use super::run_folder::RunFolder;
 use super::tables::{
     ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
-    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, OutputSeconds, ProbeTable,
+    FrameCost, IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, OutputSeconds, ProbeTable,
     storage, write_cost,
 };
 use super::view::View;
@@ -41,6 +41,7 @@ pub struct Record<'a> {
     view: View,
     frames: usize,
     seconds: OutputSeconds,
+    solved: Vec<FrameCost>,
 }
 
 impl<'a> Record<'a> {
@@ -83,6 +84,7 @@ impl<'a> Record<'a> {
             view: View::new(run),
             frames: 0,
             seconds: OutputSeconds::default(),
+            solved: Vec::new(),
         })
     }
 
@@ -207,6 +209,11 @@ impl<'a> Record<'a> {
         self.seconds.waited += seconds;
     }
 
+    /// Keeps what it took to solve a frame.
+    pub fn solved(&mut self, cost: FrameCost) {
+        self.solved.push(cost);
+    }
+
     /// What writing took so far.
     pub fn seconds(&self) -> OutputSeconds {
         self.seconds
@@ -222,6 +229,6 @@ impl<'a> Record<'a> {
             let text = storage(names.into_iter(), self.activity.iter().cloned());
             self.run.write("tables/activations.sto", text)?;
         }
-        write_cost(self.run, self.model, work, self.seconds, estimate)
+        write_cost(self.run, self.model, work, (self.seconds, &self.solved), estimate)
     }
 }

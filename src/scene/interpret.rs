@@ -523,6 +523,9 @@ fn marker(table: &mut Table) -> Option<MarkerSpec> {
     Some(MarkerSpec { name, label, position_mm: position_mm?, sd_mm: sd_mm?, place: table.place() })
 }
 
+/// So few sensitivities cost less than the steps that kept ones add (`problems/fit_study`).
+const FEW_UNKNOWNS: usize = 12;
+
 fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let markers = table.required("markers", "markers = \"recording.mcap\"", |item| references.file(&item));
     let markers_place = table.place_of("markers");
@@ -532,8 +535,13 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let sensitivities =
         [("tangent", SensitivitySpec::Tangent), ("finite-difference", SensitivitySpec::FiniteDifference)];
     let sensitivity = table.or("sensitivity", SensitivitySpec::Tangent, |item| item.choice(&sensitivities, &[]));
-    let reuses = [("fresh", ReuseSpec::Fresh), ("frozen", ReuseSpec::Frozen), ("broyden", ReuseSpec::Broyden)];
-    let reuse = table.or("reuse", ReuseSpec::Fresh, |item| item.choice(&reuses, &[]));
+    let reuses = [
+        ("fresh", ReuseSpec::Fresh),
+        ("frozen", ReuseSpec::Frozen),
+        ("broyden", ReuseSpec::Broyden),
+        ("adjoint", ReuseSpec::Adjoint),
+    ];
+    let reuse = table.optional("reuse", |item| item.choice(&reuses, &[]));
     let unknowns = match references.muscles() {
         // which of the bones are sought must be said
         none if none.is_empty() && references.has_bones() => {
@@ -551,7 +559,12 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let frames_place = table.place_of("frames");
     let registration = registration::registration(table, units);
-    let tolerance = table.or("tolerance", 1e-6, |item| item.number(PART));
+    let tolerance = table.or("tolerance", FitToleranceSpec::Change(1e-6), |item| match item.node.value {
+        Value::Table(_) => item.table(|table| {
+            table.required("sds", "sds = 0.1", |item| item.number(PART)).map(FitToleranceSpec::Sds)
+        }),
+        _ => item.number(PART).map(FitToleranceSpec::Change),
+    });
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));
     let finite_difference_step = table.or("finite_difference_step", 1e-4, |item| item.number(PART));
     Some(FitSpec {
@@ -559,7 +572,10 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         units: units?,
         topic: topic?,
         sensitivity: sensitivity?,
-        reuse: reuse?,
+        reuse: reuse?.unwrap_or(match unknowns.as_ref()?.len() {
+            many if many > FEW_UNKNOWNS => ReuseSpec::Adjoint,
+            _ => ReuseSpec::Fresh,
+        }),
         unknowns: unknowns?,
         zero_is_missing: zero_is_missing?,
         allow_truncated: allow_truncated?,

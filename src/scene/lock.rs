@@ -474,6 +474,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         ReuseSpec::Fresh => "fresh",
         ReuseSpec::Frozen => "frozen",
         ReuseSpec::Broyden => "broyden",
+        ReuseSpec::Adjoint => "adjoint",
     };
     let unknowns = unknowns.iter().map(|name| text(name)).collect::<Vec<_>>().join(", ");
     let range = |FramesSpec { first, last, step }: &FramesSpec| {
@@ -510,7 +511,10 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     lines.extend(offset_sd_mm.map(|sd| format!("offset_sd_mm = {}", number(sd))));
     lines.extend([
         format!("axes = [{}]", axes.map(|axis| text(axis.word())).join(", ")),
-        format!("tolerance = {}", number(*tolerance)),
+        match tolerance {
+            FitToleranceSpec::Change(part) => format!("tolerance = {}", number(*part)),
+            FitToleranceSpec::Sds(sds) => format!("tolerance = {{ sds = {} }}", number(*sds)),
+        },
         format!("max_iterations = {max_iterations}"),
         format!("finite_difference_step = {}", number(*finite_difference_step)),
     ]);

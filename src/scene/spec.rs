@@ -805,8 +805,8 @@ pub struct FitSpec {
     pub frames: FramesSpec,
     /// How the recording is brought to the model.
     pub registration: RegistrationSpec,
-    /// The change of the controls, as a part of their range, at which the search ends; the step that shows it is still taken.
-    pub tolerance: f64,
+    /// The step at which the search ends; it is still taken.
+    pub tolerance: FitToleranceSpec,
     /// The most Gauss-Newton steps per frame.
     pub max_iterations: usize,
     /// The step of finite differences in relation to (activation + onset), the onset being the shear modulus of the
@@ -927,6 +927,16 @@ pub enum SensitivitySpec {
     FiniteDifference,
 }
 
+/// The step at which the search for a frame ends: `[fit] tolerance`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitToleranceSpec {
+    /// So large a change of a control, as a part of its range.
+    Change(f64),
+    /// A step so many standard deviations of the answer long, all controls together.
+    Sds(f64),
+}
+
 /// What becomes of sensitivities after a step of a fit: `[fit] reuse`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -937,6 +947,8 @@ pub enum ReuseSpec {
     Frozen,
     /// They are kept but for what the step shows.
     Broyden,
+    /// They are kept, with an exact gradient at every step.
+    Adjoint,
 }
 
 /// Frames `first`, `first + step`, ... up to and including `last` (or the end of the recording); counted from 0.

@@ -4,6 +4,7 @@
 pub mod clips;
 pub mod twin;
 
+use risorius::forward::{Equilibrium, Solver};
 use risorius::math::tensor::{Matrix, Vector, determinant, normalised, rotation};
 use risorius::mesh::Mesh;
 use risorius::mesh::block::block;
@@ -102,6 +103,21 @@ pub fn assert_close(what: &str, ours: &[f64], theirs: &[f64], tolerance: f64) {
     let difference: Vec<f64> = ours.iter().zip(theirs).map(|(a, b)| a - b).collect();
     let (error, scale) = (largest(&difference), largest(theirs));
     assert!(error <= tolerance * scale, "{what}: relative difference {:.2e}", error / scale);
+}
+
+/// The pull-back of forces on all displacement parameters by one solve, against what the sensitivities `rates` of all controls
+/// say: `displacement_rate` of each.
+pub fn assert_pulled_back(name: &str, solver: &mut Solver<'_>, found: &Equilibrium, rates: &[Vec<f64>]) {
+    let model = solver.model();
+    let pull: Vec<[f64; 3]> =
+        (0..model.mesh().parameters.len()).map(|k| [0.3, -0.7, 1.1].map(|c| (c * (k + 1) as f64).sin())).collect();
+    let controls: Vec<usize> = (0..rates.len()).collect();
+    let by_one_solve = solver.pulled_back(&found.state, &pull, &controls).expect("solved").expect("a factor that serves");
+    let along = |control: usize| -> f64 {
+        let du = model.displacement_rate(&found.state, control, &rates[control]);
+        du.iter().flatten().zip(pull.iter().flatten()).map(|(du, b)| du * b).sum()
+    };
+    assert_close(name, &by_one_solve, &controls.into_iter().map(along).collect::<Vec<f64>>(), 1e-6);
 }
 
 /// A block of elements of about 10 mm whose parameters are all moved at random by up to `amount` x 10 mm.

@@ -3,6 +3,7 @@
 
 use super::contact_closed_forms::{contact, contact_points};
 use super::support::{Discretisation, assert_close, model, side};
+use crate::common::assert_pulled_back;
 use risorius::fit::sensitivity::{Sensitivity, sensitivities};
 use risorius::forward::{Drive, Settings, Solver};
 use risorius::mesh::block::block;
@@ -37,6 +38,7 @@ fn check(name: &str, model: &Model, tolerance: f64) -> (usize, usize) {
     let active = closed(&found);
     let iterations = solver.work().iterations;
     let ours = sensitivities(Sensitivity::Tangent, &mut solver, &found, &[0]).expect("a regular tangent");
+    assert_pulled_back(name, &mut solver, &found, &ours);
     let step = 2e-4;
     let differences =
         sensitivities(Sensitivity::FiniteDifference { step }, &mut solver, &found, &[0]).expect("neighbours");

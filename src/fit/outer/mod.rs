@@ -23,7 +23,7 @@ pub use confounding::{Confounding, FrameConfounding};
 use super::Estimate;
 use super::covariance::SymmetricInverse;
 use super::estimate::FitIteration;
-use super::gauss_newton::{GaussNewton, GaussNewtonState, Range};
+use super::gauss_newton::{GaussNewton, GaussNewtonState, Range, Tolerance};
 use super::identifiability::RANGE_ALONE;
 use super::observed::{Log, own_error};
 use crate::error::{Error, Result};
@@ -150,7 +150,7 @@ fn search(
     let most = outer.max_iterations as u64;
     let before = profile.marker_rms(&start, &outer.held_out);
     tell(format!("{} frames with the problem as it is: {}", profile.frames().len(), profile.told(&start)?));
-    let run = Executor::new(profile, GaussNewton::new(ranges.clone(), outer.tolerance))
+    let run = Executor::new(profile, GaussNewton::new(ranges.clone(), Tolerance::Change(outer.tolerance)))
         .configure(|state: GaussNewtonState| state.param(start.clone()).max_iters(most))
         .add_observer(log.clone(), ObserverMode::Always)
         .timer(false)

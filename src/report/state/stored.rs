@@ -23,7 +23,7 @@ stored!(Iteration { residual, required, factor, corrections });
 stored!(Step { place, kind, iterations, residual, required });
 stored!(Snap { place, modes, distance });
 stored!(Equilibrium { state, evaluation, history, snaps, negative_modes });
-stored!(FitIteration { cost, step, trust, rejected });
+stored!(FitIteration { cost, step, left, trust, rejected });
 stored!(Directions { columns, fresh });
 stored!(Past { time_s, a, covariance });
 stored!(Memory { last, directions, before, tangent });

@@ -15,10 +15,20 @@ pub struct OutputSeconds {
     pub written: f64,
 }
 
+/// What it took to solve a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameCost {
+    /// Wall time, s.
+    pub seconds: f64,
+    /// Factorisations of the tangent.
+    pub factorisations: usize,
+}
+
 /// Writes the table `part,seconds,clock,points,count,flops`: a row per effect that the scene named (seconds summed over
 /// `threads`, quadrature points evaluated), then rows on the `wall` clock for `assembly` (evaluations, which hold the
 /// effects, and assemblies), `factorisation`, `solve` and `output` (solving waited for files), one on the clock of the `writer`, a
-/// thread beside the solver, for `writing`, and one for `estimate`, the whole of what estimates of the error took, if there
+/// thread beside the solver, for `writing`, one for a `warm frame`, the medians of all frames but the first that was solved,
+/// if there are any (`count`: factorisations), and one for `estimate`, the whole of what estimates of the error took, if there
 /// were any: its work and seconds.
 ///
 /// # Errors
@@ -27,7 +37,7 @@ pub fn write_cost(
     run: &RunFolder,
     model: &Model,
     work: &Work,
-    output: OutputSeconds,
+    (output, frames): (OutputSeconds, &[FrameCost]),
     estimate: Option<(&Work, f64)>,
 ) -> Result<()> {
     let mut rows = Rows::default();
@@ -46,6 +56,12 @@ pub fn write_cost(
     wall("factorisation", linear.factor_time.as_secs_f64(), count, flops);
     wall("solve", linear.solve_time.as_secs_f64(), linear.solves.into(), Cell::Empty);
     wall("output", output.waited, Cell::Empty, Cell::Empty);
+    let warm = frames.get(1..).unwrap_or_default();
+    if !warm.is_empty() {
+        let seconds = median(warm.iter().map(|frame| frame.seconds));
+        let factorisations = median(warm.iter().map(|frame| frame.factorisations as f64));
+        wall("warm frame", seconds, factorisations.into(), Cell::Empty);
+    }
     let writing = [output.written.into(), "writer".into()].into_iter().chain([const { Cell::Empty }; 3]);
     rows.add(["writing".into()].into_iter().chain(writing));
     if let Some((work, seconds)) = estimate {
@@ -54,4 +70,11 @@ pub fn write_cost(
         rows.add(["estimate".into()].into_iter().chain(cost));
     }
     run.write("tables/cost.csv", rows.text)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) }
 }

@@ -25,7 +25,7 @@ pub use activations::ActivationTable;
 pub use bones::BoneTable;
 pub use contact::ContactTable;
 pub use convergence::ConvergenceTable;
-pub use cost::{OutputSeconds, write_cost};
+pub use cost::{FrameCost, OutputSeconds, write_cost};
 pub use energies::EnergyTable;
 pub use estimate::EstimateTable;
 pub use fit::FitTable;
