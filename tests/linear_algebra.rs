@@ -377,6 +377,27 @@ fn a_stale_factor_still_solves_the_new_matrix() {
     assert_eq!(work.factor_flops, factor.flops());
 }
 
+/// Where two places touch that were apart, the matrix has entries that the factor does not know.
+#[test]
+fn a_factor_of_another_pattern_still_solves_the_new_matrix() {
+    let grid = Grid::new([8, 6, 1], Pressure::Continuous, |_| 24);
+    let mut touching = Grid::new([8, 6, 1], Pressure::Continuous, |_| 24);
+    let nodes = touching.group_start.len() - 1;
+    touching.cliques.push(vec![0, nodes - 1]);
+    let old = grid.matrix(&grid.pattern(), 1, 10.0, 1.0);
+    let new = touching.matrix(&touching.pattern(), 1, 10.0, 1.0);
+    let mut factor = factored(&grid, &old);
+    let b = Random(3).vector(new.pattern.n());
+    let mut x = b.clone();
+    let quality = factor.solve_within(&new, &mut x, 1, 1e-9, 60).unwrap();
+    let mut product = vec![0.0; b.len()];
+    new.multiply(&x, &mut product);
+    assert!(quality.residual <= 1e-9 && quality.sweeps > 1, "{quality:?}");
+    assert!(difference(&product, &b) <= 1e-8 * norm(&b));
+    let few = factor.solve_within(&new, &mut b.clone(), 1, 1e-9, 1).unwrap();
+    assert!(few.residual > 1e-9 && few.sweeps <= 1, "{few:?}");
+}
+
 #[test]
 fn a_useless_factor_says_so_and_ends() {
     let grid = Grid::new([3, 2, 1], Pressure::Continuous, |_| 24);
