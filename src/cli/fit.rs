@@ -20,7 +20,9 @@ use crate::markers::Recording;
 use crate::math::motion::Motion;
 use crate::math::tensor::subtract;
 use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
-use crate::report::tables::{FrameCost, FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration};
+use crate::report::tables::{
+    FrameCost, FreeHeadRow, HeadRow, Placement, write_free_head, write_head, write_registration,
+};
 use crate::report::{FailedFrame, Frame, Record};
 use crate::scene::{ClipSpec, FitSpec, Scene};
 use std::time::Instant;

@@ -166,7 +166,8 @@ impl<'f, 'm> FrameProblem<'f, 'm> {
         start: Equilibrium,
         directions: Option<Directions>,
     ) -> FrameProblem<'f, 'm> {
-        let inner = RefCell::new(Inner { solver, base: start, directions, renew: false, trial: None, held_head: None });
+        let inner =
+            RefCell::new(Inner { solver, base: start, directions, renew: false, trial: None, held_head: None });
         FrameProblem { markers, measured, unknowns, sensitivity, reuse, drive, aims, free_head: false, inner }
     }
 

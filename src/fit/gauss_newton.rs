@@ -154,7 +154,15 @@ const STILL: f64 = 1e-11;
 impl GaussNewton {
     /// For controls with the given ranges.
     pub fn new(ranges: Vec<Range>, tolerance: Tolerance) -> GaussNewton {
-        GaussNewton { ranges, tolerance, trust: FIRST_TRUST, converged: false, last_sds: None, keeps: false, fresh: true }
+        GaussNewton {
+            ranges,
+            tolerance,
+            trust: FIRST_TRUST,
+            converged: false,
+            last_sds: None,
+            keeps: false,
+            fresh: true,
+        }
     }
 
     /// For a problem that keeps Jacobians until it is told to renew them.

@@ -26,8 +26,7 @@ impl Observe<GaussNewtonState> for Log {
     fn observe_iter(&mut self, state: &GaussNewtonState, kv: &KV) -> std::result::Result<(), argmin::core::Error> {
         let number = |key: &str| kv.get(key).and_then(|v| v.get_float()).unwrap_or(f64::NAN);
         let rejected = kv.get("rejected").and_then(|v| v.get_uint()).unwrap_or(0);
-        let iteration =
-FitIteration {
+        let iteration = FitIteration {
             cost: state.get_cost(),
             step: number("step"),
             left: number("left"),

@@ -11,9 +11,9 @@ mod heads;
 
 use super::bounded_step::bounded_step_in_chain;
 use super::covariance::{Bound, standard_deviations};
-use super::gauss_newton::Length;
 use super::estimate::{Estimate, FitIteration, Optimum};
 use super::frame::{Aims, FrameProblem, Measured};
+use super::gauss_newton::Length;
 use super::objective::Sum;
 use super::objective::smoothness::Link;
 use super::observed::own_error;

@@ -204,12 +204,7 @@ impl<'m> Balance<'m> {
     /// the rates.
     ///
     ///   K l + B^T z = b_f,  B l = 0:   b . du/dq = l . (- dr/dq - K_fp du_p/dq) - z . c + b_p . du_p/dq
-    pub fn pulled_back(
-        &mut self,
-        state: &State,
-        pull: &[[f64; 3]],
-        controls: &[usize],
-    ) -> Result<Option<Vec<f64>>> {
+    pub fn pulled_back(&mut self, state: &State, pull: &[[f64; 3]], controls: &[usize]) -> Result<Option<Vec<f64>>> {
         let model = self.model;
         let mut adjoint = model.force_of_unknowns(pull);
         self.evaluate(state, Want::Stiffness, None);
@@ -393,7 +388,8 @@ impl<'m> Balance<'m> {
             return Ok(false);
         }
         let original = rhs.to_vec();
-        let quality = self.factor.solve_within(&self.tangent.matrix, rhs, columns, accuracy.tolerance, STALE_SWEEPS)?;
+        let quality =
+            self.factor.solve_within(&self.tangent.matrix, rhs, columns, accuracy.tolerance, STALE_SWEEPS)?;
         let serves = quality.residual <= accuracy.required;
         if !serves {
             rhs.copy_from_slice(&original);

@@ -575,12 +575,7 @@ impl<'m> Solver<'m> {
     ///
     /// # Errors
     /// As [`Solver::solve_with_tangent`].
-    pub fn pulled_back(
-        &mut self,
-        state: &State,
-        pull: &[[f64; 3]],
-        controls: &[usize],
-    ) -> Result<Option<Vec<f64>>> {
+    pub fn pulled_back(&mut self, state: &State, pull: &[[f64; 3]], controls: &[usize]) -> Result<Option<Vec<f64>>> {
         self.balance.pulled_back(state, pull, controls)
     }
 

@@ -6,8 +6,8 @@ use super::frame::{
 };
 use super::run_folder::RunFolder;
 use super::tables::{
-    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable,
-    FrameCost, IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, OutputSeconds, ProbeTable,
+    ActivationTable, BoneTable, ContactTable, ConvergenceTable, EnergyTable, EstimateTable, FitTable, FrameCost,
+    IdentifiabilityTables, MarkerTable, MuscleTable, ObjectiveTable, OutlierTable, OutputSeconds, ProbeTable,
     storage, write_cost,
 };
 use super::view::View;

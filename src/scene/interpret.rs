@@ -560,9 +560,8 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let frames_place = table.place_of("frames");
     let registration = registration::registration(table, units);
     let tolerance = table.or("tolerance", FitToleranceSpec::Change(1e-6), |item| match item.node.value {
-        Value::Table(_) => item.table(|table| {
-            table.required("sds", "sds = 0.1", |item| item.number(PART)).map(FitToleranceSpec::Sds)
-        }),
+        Value::Table(_) => item
+            .table(|table| table.required("sds", "sds = 0.1", |item| item.number(PART)).map(FitToleranceSpec::Sds)),
         _ => item.number(PART).map(FitToleranceSpec::Change),
     });
     let max_iterations = table.or("max_iterations", 50, |item| item.whole(1, 10_000));

@@ -112,7 +112,8 @@ pub fn assert_pulled_back(name: &str, solver: &mut Solver<'_>, found: &Equilibri
     let pull: Vec<[f64; 3]> =
         (0..model.mesh().parameters.len()).map(|k| [0.3, -0.7, 1.1].map(|c| (c * (k + 1) as f64).sin())).collect();
     let controls: Vec<usize> = (0..rates.len()).collect();
-    let by_one_solve = solver.pulled_back(&found.state, &pull, &controls).expect("solved").expect("a factor that serves");
+    let by_one_solve =
+        solver.pulled_back(&found.state, &pull, &controls).expect("solved").expect("a factor that serves");
     let along = |control: usize| -> f64 {
         let du = model.displacement_rate(&found.state, control, &rates[control]);
         du.iter().flatten().zip(pull.iter().flatten()).map(|(du, b)| du * b).sum()

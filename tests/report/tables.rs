@@ -4,7 +4,8 @@ use super::model::{MUSCLES, model};
 use super::support::{FRAME, run_in, solved, some_markers, temporary};
 use risorius::mesh::MaterialPoint;
 use risorius::report::tables::{
-    ActivationTable, ConvergenceTable, EnergyTable, MarkerTable, MuscleTable, OutputSeconds, ProbeTable, write_cost,
+    ActivationTable, ConvergenceTable, EnergyTable, FrameCost, MarkerTable, MuscleTable, OutputSeconds, ProbeTable,
+    write_cost,
 };
 use risorius::report::{Frame, Probe, muscle_states, probe_states};
 use risorius::term::pressure::Trilinear;
@@ -121,19 +122,23 @@ fn tables_have_their_columns_and_every_bit() {
     assert!(last[2] == "1.0" && last[3] == "walked" && residual[0] <= residual[1], "{last:?}");
 
     let output = OutputSeconds { waited: 0.5, written: 2.0 };
-    write_cost(&run, &model, &work, output, Some((&work, 0.25))).expect("written");
+    let frames =
+        [(9.0, 40), (1.0, 2), (3.0, 5)].map(|(seconds, factorisations)| FrameCost { seconds, factorisations });
+    write_cost(&run, &model, &work, (output, &frames), Some((&work, 0.25))).expect("written");
     let rows = table("cost");
     assert_eq!(rows[0], columns("part,seconds,clock,points,count,flops"));
     let parts: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
-    let solver = ["assembly", "factorisation", "solve", "output", "writing", "estimate"];
+    let solver = ["assembly", "factorisation", "solve", "output", "warm frame", "writing", "estimate"];
     assert_eq!(parts, [&["tissue", MUSCLES[0], MUSCLES[1], "traction"][..], &solver].concat());
     let evaluations = work.force_evaluations + work.assemblies;
     assert_eq!(rows[1][3], (evaluations * 6 * 64).to_string());
     assert_eq!(rows[6][4], work.linear.factorisations.to_string());
     assert_eq!(
-        [&rows[8][1..], &rows[9][1..]].map(|row| [row[0].as_str(), &row[1]]),
+        [&rows[8][1..], &rows[10][1..]].map(|row| [row[0].as_str(), &row[1]]),
         [["0.5", "wall"], ["2.0", "writer"]]
     );
+    // the first frame is not warm
+    assert_eq!([&rows[9][1], &rows[9][4]], ["2.0", "3.5"]);
 }
 
 /// A table grows by whole frames, and what was written is on disk without closing it.
