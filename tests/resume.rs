@@ -76,7 +76,8 @@ fn assert_same(whole: &Path, resumed: &Path) {
 #[test]
 fn killed_and_interrupted_fits_go_on_to_the_same_bytes() {
     let kept = "reuse = \"broyden\"\nsmoothness = { sd_per_root_s = 0.1, sd_per_root_s3 = 20 }\n";
-    for (extra, flag) in [("", "--force"), (kept, "--estimate")] {
+    let exact = "reuse = \"adjoint\"\ntolerance = { sds = 0.01 }\n";
+    for (extra, flag) in [("", "--force"), (kept, "--estimate"), (exact, "--force")] {
         let folder = prepare(extra);
         let whole = ["run", "twin.toml", "--out", "whole", flag];
         let cut = ["run", "twin.toml", "--out", "cut", flag, "--progress=plain"];

@@ -805,7 +805,7 @@ pub struct FitSpec {
     pub frames: FramesSpec,
     /// How the recording is brought to the model.
     pub registration: RegistrationSpec,
-    /// The step at which the search ends; it is still taken.
+    /// Where the search ends; the step that shows it is still taken.
     pub tolerance: FitToleranceSpec,
     /// The most Gauss-Newton steps per frame.
     pub max_iterations: usize,
@@ -927,13 +927,13 @@ pub enum SensitivitySpec {
     FiniteDifference,
 }
 
-/// The step at which the search for a frame ends: `[fit] tolerance`.
+/// Where the search for a frame ends: `[fit] tolerance`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitToleranceSpec {
-    /// So large a change of a control, as a part of its range.
+    /// With a step that changes a control by no more than this, as a part of its range.
     Change(f64),
-    /// A step so many standard deviations of the answer long, all controls together.
+    /// Where the answer is so many standard deviations from the optimum, as the steps tell, all controls together.
     Sds(f64),
 }
 
