@@ -81,13 +81,15 @@ pub struct Length {
     pub cost: f64,
     /// How many residuals there are beyond the number of controls.
     pub surplus: usize,
+    /// Whether the trust region cut it: it then tells nothing of how far the optimum is.
+    pub cut: bool,
 }
 
 impl Tolerance {
     /// What a step leaves that follows one of `before` standard deviations, in the units of [`Tolerance::size`], and its own
     /// length in standard deviations.
     pub fn left(self, step: Length, before: Option<f64>) -> (f64, f64) {
-        let Length { change, promised, cost, surplus } = step;
+        let Length { change, promised, cost, surplus, cut } = step;
         let variance = match self {
             Tolerance::Sds { known: false, .. } => 2.0 * cost / surplus.max(1) as f64,
             _ => 1.0,
@@ -95,6 +97,7 @@ impl Tolerance {
         let sds = (2.0 * promised.max(0.0) / variance.max(f64::MIN_POSITIVE)).sqrt();
         match self {
             Tolerance::Change(_) => (change, sds),
+            Tolerance::Sds { .. } if cut => (f64::INFINITY, sds),
             Tolerance::Sds { .. } => (before.map_or(sds, |before| sds * (sds / before).min(1.0)), sds),
         }
     }
@@ -227,7 +230,8 @@ where
             let step = trial.iter().zip(&q).zip(&self.ranges).map(part).fold(0.0, f64::max);
             let d = DVector::from_vec(d);
             let promised = -(g.dot(&d) + 0.5 * d.dot(&(&h * &d)));
-            let length = Length { change: step, promised, cost: before, surplus: r.len().saturating_sub(n) };
+            let (surplus, cut) = (r.len().saturating_sub(n), d.amax() > 0.99 * self.trust);
+            let length = Length { change: step, promised, cost: before, surplus, cut };
             let (left, sds) = self.tolerance.left(length, self.last_sds);
             let last = left <= self.tolerance.size();
             if !self.fresh && (last || rejected == REJECTED_WITH_KEPT) {

@@ -101,7 +101,9 @@ impl<'m> Fit<'m> {
             let curved: f64 = hessian.times(&d).iter().zip(&d).map(|(h, d)| h * d).sum();
             let residuals: usize = nodes.iter().filter_map(|node| Some(node.at.as_ref()?.residuals.len())).sum();
             let promised = -(gradient.iter().zip(&d).map(|(g, d)| g * d).sum::<f64>() + 0.5 * curved);
-            let length = Length { change: step, promised, cost, surplus: residuals.saturating_sub(a.len()) };
+            let (surplus, cut) =
+                (residuals.saturating_sub(a.len()), (0..d.len()).any(|i| d[i].abs() > 0.99 * radius(i)));
+            let length = Length { change: step, promised, cost, surplus, cut };
             let (left, sds) = self.tolerance.left(length, before);
             let last = left <= self.tolerance.size();
             let trial: Vec<f64> = (0..a.len())
