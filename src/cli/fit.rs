@@ -53,6 +53,7 @@ pub(super) fn fit(
         book.tally.keep(*frame, std::slice::from_ref(warning));
     }
     let meter = Meter::new(flags, frames.len(), Some(&run.log));
+    fit.set_watch(meter.steps(flags));
     let mut desk = Desk { record, meter };
     // frames wait for the others where the clip is smoothed
     let smoothed = spec.objectives.clip == ClipSpec::Smoother;

@@ -37,6 +37,7 @@ pub(super) fn forward(
     let drives = drives(scene, model)?;
     let mut solver = stage(&run.log, flags, "order the unknowns", || Solver::new(model, settings(scene)))?;
     let meter = Meter::new(flags, drives.len(), Some(&run.log));
+    solver.set_watch(meter.steps(flags));
     let mut desk = Desk { record, meter };
     let (mut tally, last) = beside(&mut desk, |writer| frames(model, &mut solver, &drives, writer, (run, flags)))?;
     let mut estimates = Estimates::new(prepared, settings(scene), of_probes(&probes))?;

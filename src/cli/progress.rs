@@ -4,6 +4,7 @@ use super::diagnostics::{render_error, render_warning};
 use super::terminal::tell;
 use super::{Flags, Progress};
 use crate::error::{Error, Warning};
+use crate::forward::{Step, StepKind, Watch};
 use crate::report::{Level, Log};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -53,6 +54,42 @@ impl Meter {
             log.add(Level::Info, None, line, &[]);
         }
         self.show(line);
+    }
+
+    /// Tells every step of a path: in the log of the run, beside the bar, and under `-v` as a line.
+    pub fn steps(&self, flags: &Flags) -> Watch<'static> {
+        let log = self.log.clone();
+        let verbose = flags.verbose;
+        let bar = match &self.shown {
+            Shown::Bar(bar) => Some(bar.clone()),
+            Shown::Plain { .. } | Shown::Silent => None,
+        };
+        Box::new(move |Step { place, kind, iterations, residual, required }: &Step| {
+            let (way, taken) = (100.0 * place, iterations.len());
+            let told = match kind {
+                StepKind::Walked => format!("{way:.3} % of the way: {taken} iterations"),
+                StepKind::Snapped => format!("{way:.3} % of the way: let go, {taken} iterations"),
+                StepKind::Failed => format!(
+                    "{way:.3} % of the way: not found, {taken} iterations, residual {residual:.1e} of {required:.1e} mN"
+                ),
+            };
+            if let Some(log) = &log {
+                let numbers = [
+                    ("place", *place),
+                    ("iterations", taken as f64),
+                    ("residual_mn", *residual),
+                    ("required_mn", *required),
+                ];
+                log.add(Level::Info, None, &told, &numbers);
+            }
+            let line = || tell(&format!("  {told}\n"));
+            match &bar {
+                Some(bar) if verbose => bar.suspend(line),
+                Some(bar) => bar.set_message(told.clone()),
+                None if verbose => line(),
+                None => {}
+            }
+        })
     }
 
     /// What a frame gave notice of.

@@ -13,7 +13,7 @@ use super::observed::{Log, own_error};
 use super::placement::{Marker, check_units, place};
 use super::sensitivity::{Reuse, Sensitivity, rates_at};
 use crate::error::{Error, Result};
-use crate::forward::{Drive, Equilibrium, Settings, Solver, Work};
+use crate::forward::{Drive, Equilibrium, Settings, Solver, Watch, Work};
 use crate::markers::Recording;
 use crate::math::tensor::{norm, subtract};
 use crate::mesh::MaterialPoint;
@@ -145,6 +145,11 @@ impl<'m> Fit<'m> {
         let Memory { last, directions, before, tangent } = memory;
         (self.last, self.directions, self.before) = (last, directions, before);
         self.solver.restore_tangent(tangent.as_ref())
+    }
+
+    /// Shows the steps of paths to `watch` from now on.
+    pub fn set_watch(&mut self, watch: Watch<'m>) {
+        self.solver.set_watch(watch);
     }
 
     /// Work done so far.

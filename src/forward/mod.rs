@@ -161,13 +161,30 @@ impl From<Box<Failure>> for Error {
 pub struct Solver<'m> {
     balance: Balance<'m>,
     settings: Settings,
+    watch: Option<Watch<'m>>,
 }
+
+/// Sees every step of every path when it is done, those that failed and were cut too.
+pub type Watch<'m> = Box<dyn FnMut(&Step) + 'm>;
 
 impl<'m> Solver<'m> {
     /// # Errors
     /// Where the factor does not fit into memory.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Solver<'m>> {
-        Ok(Solver { balance: Balance::new(model, settings.tolerance, settings.precision)?, settings })
+        Ok(Solver { balance: Balance::new(model, settings.tolerance, settings.precision)?, settings, watch: None })
+    }
+
+    /// Shows the steps of paths to `watch` from now on.
+    pub fn set_watch(&mut self, watch: Watch<'m>) {
+        self.watch = Some(watch);
+    }
+
+    /// A step with what it took, once it has been seen.
+    fn seen(&mut self, step: Step) -> Step {
+        if let Some(watch) = &mut self.watch {
+            watch(&step);
+        }
+        step
     }
 
     /// The model.
@@ -287,6 +304,7 @@ impl<'m> Solver<'m> {
             match outcome.stop {
                 None if self.jumped(modes, stepper.length()) => {
                     self.balance.count_cut();
+                    self.seen(step(place, StepKind::Failed, outcome.last, outcome.iterations));
                     stepper.failed();
                 }
                 None => {
@@ -297,17 +315,18 @@ impl<'m> Solver<'m> {
                     {
                         stepper.resumed(place);
                         snaps.push(released.snap(place, found, &last));
-                        history.push(released.step(place));
+                        history.push(self.seen(released.step(place)));
                         (before, last) = (None, released.state);
                         continue;
                     }
                     modes = modes.max(found);
                     stepper.succeeded(place, outcome.iterations.len());
-                    history.push(step(place, StepKind::Walked, outcome.last, outcome.iterations));
+                    history.push(self.seen(step(place, StepKind::Walked, outcome.last, outcome.iterations)));
                     before = Some((earlier, std::mem::replace(&mut last, outcome.state)));
                 }
                 Some(stop) => {
                     self.balance.count_cut();
+                    let failed = self.seen(step(place, StepKind::Failed, outcome.last, outcome.iterations.clone()));
                     if stepper.failed() {
                         continue;
                     }
@@ -321,11 +340,11 @@ impl<'m> Solver<'m> {
                     {
                         stepper.resumed(beyond);
                         snaps.push(released.snap(beyond, 0, &last));
-                        history.push(released.step(beyond));
+                        history.push(self.seen(released.step(beyond)));
                         (before, last) = (None, released.state);
                         continue;
                     }
-                    history.push(step(place, StepKind::Failed, outcome.last, outcome.iterations));
+                    history.push(failed);
                     let reached = stepper.reached();
                     return Err(Box::new(Failure {
                         error,
