@@ -27,7 +27,7 @@ fn all_readers(run: &Path, out: &Path) -> Vec<(&'static str, Result<()>)> {
     let export = || export(run, &formats, None, out).map(drop);
     let resume = || {
         Guard::read(run)?.changes(run);
-        Checkpoints::open(run)?.left().map(drop)
+        Checkpoints::open(run)?.left(0).map(drop)
     };
     vec![
         ("inspect", Contents::of(run).map(|contents| drop(contents.to_string()))),

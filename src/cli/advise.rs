@@ -3,7 +3,7 @@
 use super::prepare::{Clip, prepare};
 use super::problem::Source;
 use super::progress::Meter;
-use super::telling::new_marker_sd;
+use super::scout::new_marker_sd;
 use super::terminal::print;
 use super::{Ending, Flags};
 use crate::error::{Error, Result};

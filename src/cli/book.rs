@@ -1,7 +1,6 @@
 //! What a fit finds, frame by frame: what is written of each, and the page at the end.
 
 use super::Flags;
-use super::estimate::{Estimated, Estimates};
 use super::noticed::noticed;
 use super::outer::PAGE;
 use super::run::{Run, Tally};
@@ -9,7 +8,6 @@ use super::telling::Telling;
 use super::terminal::print;
 use super::writer::Desk;
 use crate::error::{Result, Warning};
-use crate::fit::advise::MarkerHelp;
 use crate::fit::free_head::{FreeHead, page};
 use crate::fit::identifiability::Told;
 use crate::fit::registration::Registration;
@@ -17,7 +15,7 @@ use crate::fit::{Estimate, Fit};
 use crate::forward::Work;
 use crate::model::Model;
 use crate::report::state::SavedFrame;
-use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors, Outliers};
+use crate::report::summary::{FitSummary, FittedFrame, MarkerErrors, MeshErrors, Outliers};
 use crate::report::{Frame, MarkerPair, MeshError, Outlier};
 use crate::scene::{ControlRange, Scene};
 
@@ -25,8 +23,8 @@ use crate::scene::{ControlRange, Scene};
 pub(super) struct Book<'a> {
     model: &'a Model,
     names: &'a Names,
-    telling: Telling,
-    pub estimates: Estimates<'a>,
+    telling: Telling<'a>,
+    mesh_errors: MeshErrors,
     pub tally: Tally,
     /// The head in every frame where it was estimated.
     pub heads: Vec<(usize, FreeHead)>,
@@ -45,18 +43,10 @@ pub(super) struct Names {
 /// A frame that converged, with all that is written of it.
 pub(super) struct Entry<'a> {
     names: &'a Names,
-    pub saved: SavedFrame,
+    saved: SavedFrame,
     told: Option<Told>,
     /// What is shown of it.
     warnings: Vec<Warning>,
-}
-
-/// What a frame was found to be besides its fit, or what an earlier process had found.
-pub(super) enum Beside<'f, 'm> {
-    /// To be found now, with the fit as the frame left it.
-    Fresh(&'f Fit<'m>),
-    /// Known.
-    Known { error: Option<MeshError>, unestimated: Option<String>, help: Option<MarkerHelp> },
 }
 
 impl Names {
@@ -91,12 +81,12 @@ impl Entry<'_> {
 }
 
 impl<'a> Book<'a> {
-    pub fn new(model: &'a Model, names: &'a Names, fit: &Fit<'_>, estimates: Estimates<'a>) -> Book<'a> {
+    pub fn new(model: &'a Model, names: &'a Names, fit: &Fit<'a>) -> Book<'a> {
         Book {
             model,
             names,
-            telling: Telling::new(model.mesh(), fit, names.controls.clone()),
-            estimates,
+            telling: Telling::new(fit, &names.controls),
+            mesh_errors: MeshErrors::default(),
             tally: Tally::default(),
             heads: Vec::new(),
             fitted: Vec::new(),
@@ -105,35 +95,25 @@ impl<'a> Book<'a> {
         }
     }
 
-    /// Takes a frame that converged; gives back what is to be written of it.
-    pub fn frame(&mut self, estimate: Estimate, fit: &Fit<'_>, beside: Beside<'_, '_>) -> Result<Entry<'a>> {
+    /// Takes a frame that converged, in this process (`live`) or in an earlier one; gives back what is to be written of it.
+    pub fn frame(&mut self, saved: SavedFrame, live: bool) -> Result<Entry<'a>> {
+        let SavedFrame { estimate, error, unestimated, help } = &saved;
         let frame = Frame { index: estimate.frame, time_s: estimate.time_s };
-        let markers = pairs(&self.names.markers, &estimate);
+        let markers = pairs(&self.names.markers, estimate);
         self.errors.add(frame, &markers);
-        self.outliers.add(&set_aside(&self.names.markers, &markers, &estimate));
+        self.outliers.add(&set_aside(&self.names.markers, &markers, estimate));
+        error.iter().for_each(|error| self.mesh_errors.add(frame, error));
         let mut warnings: Vec<Warning> = estimate.bridged.then(|| bridged(frame)).into_iter().collect();
         warnings.extend(noticed(frame, self.model, &estimate.equilibrium));
-        let (error, unestimated, live, known_help) = match beside {
-            Beside::Fresh(fit) => {
-                let Estimated { error, warning } = self.estimates.fit(frame, &estimate, fit, &self.names.controls);
-                let unestimated = warning.as_ref().map(|warning| warning.message.clone());
-                warnings.extend(warning);
-                (error, unestimated, true, None)
-            }
-            Beside::Known { error, unestimated, help } => {
-                error.iter().for_each(|error| self.estimates.known(frame, error));
-                let warning = |message| Warning { code: "S013", message, place: None, help: None };
-                warnings.extend(unestimated.clone().map(warning));
-                (error, unestimated, false, help)
-            }
-        };
+        let warning = |(message, help)| Warning { code: "S013", message, place: None, help };
+        warnings.extend(unestimated.clone().map(warning));
         self.tally.keep(frame, &warnings);
         if !live {
             // an earlier process has shown them
             warnings.clear();
         }
         let biases = biases(error.as_ref());
-        let (told, help) = self.telling.frame(frame, &estimate, fit, (live, known_help), &biases)?;
+        let told = self.telling.frame(frame, estimate, *help, &biases)?;
         // one that is bridged stays among those that failed
         self.tally.frames_ok += usize::from(!estimate.bridged);
         self.heads.extend(estimate.head.clone().map(|head| (estimate.frame, head)));
@@ -143,7 +123,6 @@ impl<'a> Book<'a> {
             deviations: estimate.sd.clone(),
             bounds: estimate.bounds.clone(),
         });
-        let saved = SavedFrame { estimate, error, unestimated, help };
         Ok(Entry { names: self.names, saved, told, warnings })
     }
 
@@ -152,7 +131,7 @@ impl<'a> Book<'a> {
         mut self,
         scene: &Scene,
         (fit, registration): (&Fit<'_>, &Registration),
-        work: &Work,
+        (work, estimates): (&Work, Option<(Work, f64)>),
         run: &Run,
         (mut desk, flags): (Desk<'_>, &Flags),
     ) -> Result<Tally> {
@@ -160,7 +139,8 @@ impl<'a> Book<'a> {
             self.tally.warn(frame, vec![warning], &desk.meter, flags);
         }
         desk.record.told_of_clip(&self.telling.clip, &self.names.controls)?;
-        desk.finish(work, self.estimates.cost(), &run.log, flags)?;
+        estimates.iter().for_each(|(work, seconds)| self.mesh_errors.took(work.iterations, *seconds));
+        desk.finish(work, estimates, &run.log, flags)?;
         let controls: Vec<&str> = self.names.controls.iter().map(String::as_str).collect();
         let sought: Vec<&str> = fit.unknowns().iter().map(|k| controls[*k]).collect();
         // none where all frames share nothing that was sought
@@ -173,7 +153,7 @@ impl<'a> Book<'a> {
             frames: &self.fitted,
             frames_failed: self.tally.failed.len(),
             errors: &self.errors,
-            mesh_errors: &self.estimates.errors,
+            mesh_errors: &self.mesh_errors,
             objective: &fit.words(),
             outliers: &self.outliers,
             told: &self.telling.clip,

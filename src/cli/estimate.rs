@@ -8,7 +8,6 @@ use crate::forward::{Settings, Work};
 use crate::math::tensor::norm;
 use crate::mesh::MaterialPoint;
 use crate::model::State;
-use crate::report::summary::MeshErrors;
 use crate::report::{Frame, MeshError, Probe};
 
 /// The outcome of one estimate; neither where none was asked for.
@@ -24,7 +23,6 @@ pub(super) struct Estimates<'m> {
     estimator: Option<Estimator<'m>>,
     names: Vec<String>,
     points: Vec<MaterialPoint>,
-    pub errors: MeshErrors,
 }
 
 impl<'m> Estimates<'m> {
@@ -39,7 +37,7 @@ impl<'m> Estimates<'m> {
             None => None,
         };
         let (names, points) = points.unzip();
-        Ok(Estimates { estimator, names, points, errors: MeshErrors::default() })
+        Ok(Estimates { estimator, names, points })
     }
 
     /// Estimates the errors of the probes in an equilibrium.
@@ -82,13 +80,7 @@ impl<'m> Estimates<'m> {
             points: self.names.iter().cloned().zip(shift.iter().map(|s| norm(*s))).collect(),
             biases: biases(&shift),
         };
-        self.errors.add(frame, &error, estimator.work().iterations, estimator.seconds());
         Estimated { error: Some(error), warning: None }
-    }
-
-    /// Takes what an earlier process had estimated.
-    pub fn known(&mut self, frame: Frame, error: &MeshError) {
-        self.errors.add(frame, error, 0, 0.0);
     }
 
     /// What further estimates depend on.

@@ -14,7 +14,7 @@ use crate::forward::drives::drives;
 use crate::forward::{Drive, Equilibrium, Solver, Work};
 use crate::model::Model;
 use crate::model::build::Built;
-use crate::report::summary::ForwardSummary;
+use crate::report::summary::{ForwardSummary, MeshErrors};
 use crate::report::{FailedFrame, Frame, Probe, Record, bone_states, muscle_states, probe_states};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -41,16 +41,20 @@ pub(super) fn forward(
     let mut desk = Desk { record, meter };
     let (mut tally, last) = beside(&mut desk, |writer| frames(model, &mut solver, &drives, writer, (run, flags)))?;
     let mut estimates = Estimates::new(prepared, settings(scene), of_probes(&probes))?;
+    let mut mesh_errors = MeshErrors::default();
     if let Some((frame, found)) = &last {
         let Estimated { error, warning } = estimates.forward(*frame, &found.state);
         if let Some(error) = &error {
             desk.record.estimate(*frame, error)?;
+            mesh_errors.add(*frame, error);
         }
         tally.warn(*frame, warning.into_iter().collect(), &desk.meter, flags);
     }
     desk.meter.finish();
     *work = solver.work();
-    desk.finish(work, estimates.cost(), &run.log, flags)?;
+    let cost = estimates.cost();
+    cost.iter().for_each(|(work, seconds)| mesh_errors.took(work.iterations, *seconds));
+    desk.finish(work, cost, &run.log, flags)?;
     if let Some((frame, found)) = &last {
         let x = model.current(&found.state);
         let summary = ForwardSummary {
@@ -66,7 +70,7 @@ pub(super) fn forward(
             reactions: &model.supports().rotation_reactions(model.mesh(), &found.evaluation.force, &x),
             det_f: found.evaluation.det_f,
             volume_change: model.mesh().volume(&x) / model.mesh().volume(&model.mesh().parameters) - 1.0,
-            mesh_errors: &estimates.errors,
+            mesh_errors: &mesh_errors,
             iterations: work.iterations,
             seconds: run.start.elapsed().as_secs_f64(),
             folder: &run.folder.path().display().to_string(),

@@ -6,6 +6,7 @@
 mod advise;
 mod book;
 mod check;
+mod chunk;
 mod completions;
 pub mod diagnostics;
 mod estimate;
@@ -25,6 +26,7 @@ mod progress;
 mod report;
 mod resume;
 mod run;
+mod scout;
 mod study;
 mod telling;
 mod terminal;
@@ -91,7 +93,7 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Optimal::D)]
         criterion: Optimal,
         /// Not nearer than this to another marker
-        #[arg(long, default_value_t = telling::APART_MM, value_name = "MM", value_parser = millimetres)]
+        #[arg(long, default_value_t = scout::APART_MM, value_name = "MM", value_parser = millimetres)]
         apart_mm: f64,
         /// As JSON
         #[arg(long)]

@@ -57,14 +57,14 @@ impl Meter {
     }
 
     /// Tells every step of a path: in the log of the run, beside the bar, and under `-v` as a line.
-    pub fn steps(&self, flags: &Flags) -> Watch<'static> {
+    pub fn steps(&self, flags: &Flags) -> Watch {
         let log = self.log.clone();
         let verbose = flags.verbose;
         let bar = match &self.shown {
             Shown::Bar(bar) => Some(bar.clone()),
             Shown::Plain { .. } | Shown::Silent => None,
         };
-        Box::new(move |Step { place, kind, iterations, residual, required }: &Step| {
+        Arc::new(move |Step { place, kind, iterations, residual, required }: &Step| {
             let (way, taken) = (100.0 * place, iterations.len());
             let told = match kind {
                 StepKind::Walked => format!("{way:.3} % of the way: {taken} iterations"),

@@ -1,5 +1,7 @@
 //! `risorius resume RUN`: goes on after Ctrl-C, a crash or a full disk.
 
+use super::fit::{done, parts};
+use super::prepare::prepare;
 use super::problem::Source;
 use super::run::{self, Run};
 use super::terminal::tell;
@@ -23,15 +25,18 @@ pub(super) fn resume(folder: &Path, flags: &Flags) -> Result<Ending> {
         return Ok(Ending::Ok);
     }
     let checkpoints = Checkpoints::open(folder)?;
-    let left = checkpoints.left()?;
     let source = Source::read(Some(&folder.join("problem.lock.toml")), flags)?;
-    let prepared = super::prepare::prepare(&source)?;
+    let prepared = prepare(&source)?;
+    let done = match (&source.scene.fit, &prepared.clip) {
+        (Some(spec), Some(clip)) => done(&parts(spec, clip, &checkpoints)?),
+        _ => 0,
+    };
     flags.warn(&prepared.warnings);
     if !flags.quiet {
-        tell(&format!("{} frames are done\n", left.frames.len()));
+        tell(&format!("{done} frames are done\n"));
     }
     if flags.dry_run {
         return Ok(Ending::Ok);
     }
-    run::go_on(source, prepared, Run::again(folder, guard.inputs)?, flags, (checkpoints, left))
+    run::go_on(source, prepared, Run::again(folder, guard.inputs)?, flags, checkpoints)
 }

@@ -11,7 +11,7 @@ use crate::error::{Error, Result, Warning};
 use crate::forward::Work;
 use crate::report::html;
 use crate::report::manifest::{Input, Numerics};
-use crate::report::state::{Checkpoints, Guard, Left};
+use crate::report::state::{Checkpoints, Guard};
 use crate::report::{FailedFrame, Frame, FrameWarning, Log, Manifest, RunFolder, Status};
 use crate::scene::{ControlValue, FitSpec, GeometrySpec, Problem, Study, Task};
 use std::path::{Path, PathBuf};
@@ -125,7 +125,7 @@ pub(super) fn run(path: Option<&Path>, flags: &Flags) -> Result<Ending> {
     };
     let run = Run { start, ..Run::new(folder, inputs, log) };
     Status::running(0, Vec::new()).write(&run.folder)?;
-    solve(source, prepared, run, flags, (checkpoints, None))
+    solve(source, prepared, run, flags, checkpoints)
 }
 
 /// Goes on with a fit that was interrupted.
@@ -134,9 +134,9 @@ pub(super) fn go_on(
     prepared: Prepared,
     run: Run,
     flags: &Flags,
-    (checkpoints, left): (Checkpoints, Left),
+    checkpoints: Checkpoints,
 ) -> Result<Ending> {
-    solve(source, prepared, run, flags, (Some(checkpoints), Some(left)))
+    solve(source, prepared, run, flags, Some(checkpoints))
 }
 
 /// Finds what all frames share, then does the task.
@@ -145,7 +145,7 @@ fn solve(
     prepared: Prepared,
     mut run: Run,
     flags: &Flags,
-    (checkpoints, left): (Option<Checkpoints>, Option<Left>),
+    checkpoints: Option<Checkpoints>,
 ) -> Result<Ending> {
     let mut work = Work::default();
     let resumable = checkpoints.is_some();
@@ -165,7 +165,7 @@ fn solve(
     let outcome = match interrupted {
         true => Ok(Tally { interrupted, ..Tally::default() }),
         false => stage(&run.log, flags, "solve the frames", || {
-            task(&source, &prepared, &run, flags, (checkpoints.as_ref(), left), &mut work)
+            task(&source, &prepared, &run, flags, checkpoints.as_ref(), &mut work)
         }),
     };
     let ending = finish(&run, &work, outcome, flags);
@@ -180,12 +180,12 @@ fn task(
     prepared: &Prepared,
     run: &Run,
     flags: &Flags,
-    (checkpoints, left): (Option<&Checkpoints>, Option<Left>),
+    checkpoints: Option<&Checkpoints>,
     work: &mut Work,
 ) -> Result<Tally> {
     match (&prepared.clip, &source.scene.fit, checkpoints) {
         (Some(clip), Some(spec), Some(checkpoints)) => {
-            fit::fit(&source.scene, spec, prepared, clip, (run, flags), (checkpoints, left), work)
+            fit::fit(&source.scene, spec, prepared, clip, (run, flags), checkpoints, work)
         }
         _ => forward::forward(&source.scene, prepared, run, flags, work),
     }

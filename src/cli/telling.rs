@@ -1,15 +1,13 @@
 //! What the markers tell, gathered over the frames of a fit: for the tables, the page and the warning F005.
 
 use crate::error::{Result, Warning};
-use crate::fit::advise::{MarkerHelp, View, candidates};
+use crate::fit::advise::MarkerHelp;
 use crate::fit::identifiability::{ClipKnowledge, Evidence, Pair, Told};
+use crate::fit::placement::Marker;
 use crate::fit::{Estimate, Fit};
-use crate::math::tensor::{Vector, norm, subtract};
-use crate::mesh::{MaterialPoint, Mesh};
+use crate::model::Control;
 use crate::report::Frame;
 
-/// A marker is not proposed nearer than this to another, mm.
-pub(super) const APART_MM: f64 = 5.0;
 /// A pair counts as worse than another where so much less of one minus its correlation is left.
 const WORSE: f64 = 0.8;
 /// A marker is proposed where it brings a deviation below this part of what it was.
@@ -18,71 +16,55 @@ const HELPS: f64 = 0.9;
 const NAMED: usize = 3;
 
 /// The frames so far.
-pub(super) struct Telling {
+pub(super) struct Telling<'m> {
     pub clip: ClipKnowledge,
-    /// Names of all controls, with units.
-    controls: Vec<String>,
-    points: Vec<MaterialPoint>,
-    positions: Vec<Vector>,
-    taken: Vec<Vector>,
+    controls: &'m [Control],
+    /// Their names, with units.
+    names: &'m [String],
+    unknowns: Vec<usize>,
+    markers: Vec<Marker>,
     /// The pair that is most alike, its frame, and the marker that would tell them apart best.
     worst: Option<(Frame, Pair, Option<MarkerHelp>)>,
 }
 
-impl Telling {
-    pub fn new(mesh: &Mesh, fit: &Fit<'_>, controls: Vec<String>) -> Telling {
-        let points = candidates(mesh);
+impl<'m> Telling<'m> {
+    pub fn new(fit: &Fit<'m>, names: &'m [String]) -> Telling<'m> {
         Telling {
             clip: ClipKnowledge::default(),
-            controls,
-            positions: points.iter().map(|p| mesh.position(*p)).collect(),
-            points,
-            taken: fit.markers().iter().map(|m| mesh.position(m.point)).collect(),
+            controls: fit.controls(),
+            names,
+            unknowns: fit.unknowns().to_vec(),
+            markers: fit.markers().to_vec(),
             worst: None,
         }
     }
 
-    /// Adds a frame; gives back what its markers tell, if that is known, and the marker that would help, if its pair is the worst so
-    /// far. `biases` are one per control that is sought, or none. The marker is sought where the frame is the one that `fit`
-    /// ended with (`live`), and otherwise known.
+    /// Adds a frame; gives back what its markers tell, if that is known. `help` is the marker that tells its pair apart best, if its pair
+    /// may be the worst so far; `biases` are one per control that is sought, or none.
     pub fn frame(
         &mut self,
         frame: Frame,
         estimate: &Estimate,
-        fit: &Fit<'_>,
-        (live, known): (bool, Option<MarkerHelp>),
+        help: Option<MarkerHelp>,
         biases: &[Option<f64>],
-    ) -> Result<(Option<Told>, Option<MarkerHelp>)> {
-        let Some(evidence) = Evidence::of(estimate, fit.controls(), fit.unknowns()) else { return Ok((None, None)) };
+    ) -> Result<Option<Told>> {
+        let Some(evidence) = Evidence::of(estimate, self.controls, &self.unknowns) else { return Ok(None) };
         let measured: Vec<bool> = estimate.measured_mm.iter().map(Option::is_some).collect();
-        let told = evidence.told(fit.markers(), &measured)?;
+        let told = evidence.told(&self.markers, &measured)?;
         self.clip.add(frame.index, &evidence, &told, biases);
-        if let Some(pair) = told.pairs.first() {
-            let left = |pair: &Pair| 1.0 - pair.correlation.abs();
-            if self.worst.as_ref().is_none_or(|(_, worst, _)| left(pair) < WORSE * left(worst)) {
-                let help = if live { self.help(pair, &evidence, estimate, fit) } else { known };
-                self.worst = Some((frame, pair.clone(), help));
-                return Ok((Some(told), help));
-            }
+        if let Some(pair) = told.pairs.first()
+            && self.worst.as_ref().is_none_or(|(_, worst, _)| pair.distinct() < WORSE * worst.distinct())
+        {
+            self.worst = Some((frame, pair.clone(), help));
         }
-        Ok((Some(told), None))
-    }
-
-    /// The marker that tells the less certain of a pair best.
-    fn help(&self, pair: &Pair, evidence: &Evidence, estimate: &Estimate, fit: &Fit<'_>) -> Option<MarkerHelp> {
-        let rates = fit.rates_at(&self.points, &estimate.equilibrium.state)?;
-        let view = View::new(evidence, &rates, new_marker_sd(fit));
-        let control = pair.controls[usize::from(pair.apart_sd[1] > pair.apart_sd[0])];
-        let open = |c: usize| self.taken.iter().all(|t| norm(subtract(*t, self.positions[c])) >= APART_MM);
-        let (candidate, before, after) = view.best_for(control, open)?;
-        Some(MarkerHelp { place: self.positions[candidate], control, sd: [before, after] })
+        Ok(Some(told))
     }
 
     /// F005, if some pair cannot be told apart.
     pub fn warning(&self) -> Option<(Frame, Warning)> {
         let (frame, pair, help) = self.worst.as_ref()?;
         let pairs = self.clip.pairs();
-        let name = |k: usize| &self.controls[k];
+        let name = |k: usize| &self.names[k];
         let named = pairs.iter().take(NAMED).map(|(count, _, pair)| {
             let [a, b] = pair.controls;
             format!("{} / {} in {count} of {} frames", name(a), name(b), self.clip.frames())
@@ -100,7 +82,7 @@ impl Telling {
             name(a),
             name(b),
             frame.index,
-            pair.words(&self.controls),
+            pair.words(self.names),
             short(pair.together),
             short(pair.together_95()),
             if pair.prior_dominated { "only the prior" } else { "much less certain" },
@@ -121,13 +103,6 @@ impl Telling {
         };
         Some((*frame, Warning { code: "F005", message, place: None, help: Some(help) }))
     }
-}
-
-/// The deviation of a marker that is added: the median of those that there are, or as all of them where none is given.
-pub(super) fn new_marker_sd(fit: &Fit<'_>) -> f64 {
-    let mut all: Vec<f64> = fit.markers().iter().map(|m| m.sd.unwrap_or(1.0)).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// Two digits that count.

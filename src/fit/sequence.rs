@@ -148,7 +148,7 @@ impl<'m> Fit<'m> {
     }
 
     /// Shows the steps of paths to `watch` from now on.
-    pub fn set_watch(&mut self, watch: Watch<'m>) {
+    pub fn set_watch(&mut self, watch: Watch) {
         self.solver.set_watch(watch);
     }
 

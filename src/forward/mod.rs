@@ -161,11 +161,11 @@ impl From<Box<Failure>> for Error {
 pub struct Solver<'m> {
     balance: Balance<'m>,
     settings: Settings,
-    watch: Option<Watch<'m>>,
+    watch: Option<Watch>,
 }
 
 /// Sees every step of every path when it is done, those that failed and were cut too.
-pub type Watch<'m> = Box<dyn FnMut(&Step) + 'm>;
+pub type Watch = Arc<dyn Fn(&Step) + Send + Sync>;
 
 impl<'m> Solver<'m> {
     /// # Errors
@@ -175,13 +175,13 @@ impl<'m> Solver<'m> {
     }
 
     /// Shows the steps of paths to `watch` from now on.
-    pub fn set_watch(&mut self, watch: Watch<'m>) {
+    pub fn set_watch(&mut self, watch: Watch) {
         self.watch = Some(watch);
     }
 
     /// A step with what it took, once it has been seen.
-    fn seen(&mut self, step: Step) -> Step {
-        if let Some(watch) = &mut self.watch {
+    fn seen(&self, step: Step) -> Step {
+        if let Some(watch) = &self.watch {
             watch(&step);
         }
         step

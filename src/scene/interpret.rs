@@ -107,6 +107,12 @@ impl Default for OutputSpec {
     }
 }
 
+impl Default for ChunksSpec {
+    fn default() -> ChunksSpec {
+        ChunksSpec { count: 1, overlap: 5 }
+    }
+}
+
 impl Default for FramesSpec {
     fn default() -> Self {
         FramesSpec { first: 0, last: None, step: 1 }
@@ -523,6 +529,8 @@ fn marker(table: &mut Table) -> Option<MarkerSpec> {
     Some(MarkerSpec { name, label, position_mm: position_mm?, sd_mm: sd_mm?, place: table.place() })
 }
 
+/// More would be shorter than they are worth, whatever the recording.
+const MOST_CHUNKS: usize = 1000;
 /// So few sensitivities cost less than the steps that kept ones add (`problems/fit_study`).
 const FEW_UNKNOWNS: usize = 12;
 
@@ -558,6 +566,10 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
     let max_marker_distance_mm = table.or("max_marker_distance_mm", 5.0, |item| item.number(NOT_NEGATIVE));
     let frames = table.or("frames", FramesSpec::default(), |item| item.table(frames));
     let frames_place = table.place_of("frames");
+    let chunks = table.or("chunks", ChunksSpec::default(), |item| match item.node.value {
+        Value::Table(_) => item.table(chunks),
+        _ => item.whole(1, MOST_CHUNKS).map(|count| ChunksSpec { count, ..ChunksSpec::default() }),
+    });
     let registration = registration::registration(table, units);
     let tolerance = table.or("tolerance", FitToleranceSpec::Change(1e-6), |item| match item.node.value {
         Value::Table(_) => item
@@ -584,6 +596,7 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         outer: outer?,
         max_marker_distance_mm: max_marker_distance_mm?,
         frames: frames?,
+        chunks: chunks?,
         registration: registration?,
         tolerance: tolerance?,
         max_iterations: max_iterations?,
@@ -593,6 +606,12 @@ fn fit(table: &mut Table, references: &References) -> Option<FitSpec> {
         units_place,
         frames_place,
     })
+}
+
+fn chunks(table: &mut Table) -> Option<ChunksSpec> {
+    let count = table.required("count", "count = 2", |item| item.whole(1, MOST_CHUNKS));
+    let overlap = table.or("overlap", ChunksSpec::default().overlap, |item| item.whole(1, MOST_FRAMES));
+    Some(ChunksSpec { count: count?, overlap: overlap? })
 }
 
 /// `frames`, and `neutral` where it is several.

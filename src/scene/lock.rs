@@ -447,6 +447,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
         outer,
         max_marker_distance_mm,
         frames,
+        chunks: ChunksSpec { count, overlap },
         registration:
             RegistrationSpec {
                 register,
@@ -505,6 +506,7 @@ fn fit_lines(fit: &FitSpec, lines: &mut Vec<String>) {
     lines.extend([
         format!("max_marker_distance_mm = {}", number(*max_marker_distance_mm)),
         format!("frames = {}", range(frames)),
+        format!("chunks = {{ count = {count}, overlap = {overlap} }}"),
         format!("register = \"{}\"", register.word()),
         format!("neutral = {neutral}"),
     ]);

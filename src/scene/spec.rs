@@ -803,6 +803,8 @@ pub struct FitSpec {
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.
     pub frames: FramesSpec,
+    /// How many of them are fitted one after the other.
+    pub chunks: ChunksSpec,
     /// How the recording is brought to the model.
     pub registration: RegistrationSpec,
     /// Where the search ends; the step that shows it is still taken.
@@ -980,6 +982,15 @@ impl FramesSpec {
             None => Ok((first..=last).step_by(step).collect()),
         }
     }
+}
+
+/// Chunks of a clip that are fitted side by side: `[fit] chunks`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct ChunksSpec {
+    /// So many at most; 1 is the whole clip, one frame after the other.
+    pub count: usize,
+    /// So many frames early each begins but the first.
+    pub overlap: usize,
 }
 
 /// How equilibrium is found: `[solver]`.

@@ -122,8 +122,11 @@ fn tables_have_their_columns_and_every_bit() {
     assert!(last[2] == "1.0" && last[3] == "walked" && residual[0] <= residual[1], "{last:?}");
 
     let output = OutputSeconds { waited: 0.5, written: 2.0 };
-    let frames =
-        [(9.0, 40), (1.0, 2), (3.0, 5)].map(|(seconds, factorisations)| FrameCost { seconds, factorisations });
+    let frames = [(9.0, 40), (1.0, 2), (8.0, 30), (3.0, 5)].map(|(seconds, factorisations)| FrameCost {
+        seconds,
+        factorisations,
+        warm: factorisations < 10,
+    });
     write_cost(&run, &model, &work, (output, &frames), Some((&work, 0.25))).expect("written");
     let rows = table("cost");
     assert_eq!(rows[0], columns("part,seconds,clock,points,count,flops"));
@@ -137,7 +140,7 @@ fn tables_have_their_columns_and_every_bit() {
         [&rows[8][1..], &rows[10][1..]].map(|row| [row[0].as_str(), &row[1]]),
         [["0.5", "wall"], ["2.0", "writer"]]
     );
-    // the first frame is not warm
+    // those that began at rest are not warm
     assert_eq!([&rows[9][1], &rows[9][4]], ["2.0", "3.5"]);
 }
 

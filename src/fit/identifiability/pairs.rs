@@ -39,6 +39,11 @@ impl Pair {
         }
     }
 
+    /// How far they are from being one: 1 - |correlation|.
+    pub fn distinct(&self) -> f64 {
+        1.0 - self.correlation.abs()
+    }
+
     /// The half width of the 95 % interval of the combination.
     pub fn together_95(&self) -> f64 {
         TWO_SIDED_95 * self.together_sd

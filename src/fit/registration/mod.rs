@@ -12,6 +12,7 @@ mod scale;
 
 pub use matching::{Proposal, propose};
 pub use mirror::{nearest, pairings};
+pub(in crate::fit) use neutral::from_rest;
 pub use neutral::{at_rest, neutral_frames};
 pub use scale::{Scale, scale};
 

@@ -51,6 +51,23 @@ pub fn at_rest(fit: &FitSpec, recording: &Recording, frames: &[usize]) -> Vec<Op
     (0..recording.labels.len()).map(mean).collect()
 }
 
+/// How far the markers of a frame are from where they are at `rest`, mm, those of both; a head that is to be estimated has been
+/// brought back. The recording is on the model.
+pub(in crate::fit) fn from_rest(
+    fit: &FitSpec,
+    markers: &[Marker],
+    (recording, frame): (&Recording, usize),
+    rest: &[Option<Vector>],
+) -> Vec<f64> {
+    let positions = &recording.frames[frame].positions_mm;
+    let pairs: Vec<Pair> = markers.iter().filter_map(|m| positions[m.column].zip(rest[m.column])).collect();
+    let motion = match fit.registration.head {
+        HeadSpec::Estimate => least_squares(&pairs, Allowed::RIGID).unwrap_or(Motion::REST),
+        _ => Motion::REST,
+    };
+    motion.distances(&pairs)
+}
+
 /// K019: the face moves over the neutral `frames`, whose mean is `rest`. The recording is on the model.
 pub(super) fn not_still(
     fit: &FitSpec,
@@ -59,16 +76,7 @@ pub(super) fn not_still(
     (frames, rest): (&[usize], &[Option<Vector>]),
 ) -> Option<Warning> {
     let [first, .., last] = *frames else { return None };
-    // how far each marker of a frame is from its mean
-    let distances = |frame: usize| -> Vec<f64> {
-        let positions = &recording.frames[frame].positions_mm;
-        let pairs: Vec<Pair> = markers.iter().filter_map(|m| positions[m.column].zip(rest[m.column])).collect();
-        let motion = match fit.registration.head {
-            HeadSpec::Estimate => least_squares(&pairs, Allowed::RIGID).unwrap_or(Motion::REST),
-            _ => Motion::REST,
-        };
-        motion.distances(&pairs)
-    };
+    let distances = |frame: usize| from_rest(fit, markers, (recording, frame), rest);
     let all: Vec<(usize, Vec<f64>)> = frames.iter().map(|frame| (*frame, distances(*frame))).collect();
     // of a coordinate; the mean has taken one frame's worth of it
     let freedom = (3 * (frames.len() - 1)) as f64 / frames.len() as f64;

@@ -3,7 +3,8 @@
 //! ```text
 //! state/problem.json          what the fit is of: the program, the lock file and every input, by their hashes
 //! state/frame_000012.bin      a frame that is done, or that failed
-//! state/memory.bin            how many frames are done, and what the next one starts from
+//! state/memory.bin            which frame comes next, and what it starts from
+//! state/chunk_1/              the same of the second chunk, where a clip is fitted in chunks
 //! ```
 //!
 //! Every file is written beside its place and renamed; `memory.bin` comes last and says what counts. Each carries the hash of
@@ -27,7 +28,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// First bytes of a checkpoint.
-const MAGIC: &[u8; 16] = b"risorius state 3";
+const MAGIC: &[u8; 16] = b"risorius state 4";
 
 /// What a fit is of.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,8 +48,8 @@ pub struct SavedFrame {
     pub estimate: Estimate,
     /// The error of the mesh, if it was estimated.
     pub error: Option<MeshError>,
-    /// Why it was not, if it should have been.
-    pub unestimated: Option<String>,
+    /// Why it was not, if it should have been, and the remedy.
+    pub unestimated: Option<(String, Option<String>)>,
     /// The marker that would tell its worst pair apart.
     pub help: Option<MarkerHelp>,
 }
@@ -71,19 +72,19 @@ pub struct Carried {
     pub halved: Option<[State; 2]>,
 }
 
-/// The folder `state` of a run.
+/// The folder `state` of a run, or the part of it that belongs to a chunk.
 #[derive(Debug, Clone)]
 pub struct Checkpoints {
     folder: PathBuf,
     guard: [u8; 32],
 }
 
-/// What an earlier process left.
+/// What an earlier process left of a chunk.
 #[derive(Debug)]
 pub struct Left {
-    /// Frames that are done, in the order of the fit.
-    pub frames: Vec<SavedOutcome>,
-    /// What the next one starts from; `None` before the first.
+    /// The first frame that is not done, as a place in the fit.
+    pub next: usize,
+    /// What it starts from; `None` where the chunk has not begun.
     pub carried: Option<Carried>,
 }
 
@@ -146,6 +147,19 @@ impl Checkpoints {
         Ok(Checkpoints { folder: run.join("state"), guard: Sha256::digest(guard).into() })
     }
 
+    /// Those of a chunk: of the first one these.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn of_chunk(&self, chunk: usize) -> Result<Checkpoints> {
+        if chunk == 0 {
+            return Ok(self.clone());
+        }
+        let folder = self.folder.join(format!("chunk_{chunk}"));
+        std::fs::create_dir_all(&folder).map_err(failed("create", &folder))?;
+        Ok(Checkpoints { folder, guard: self.guard })
+    }
+
     /// Keeps the frame that is number `at` (from 0) of the fit, and what the next one starts from.
     pub fn save(&self, at: usize, frame: &SavedOutcome, carried: &Carried) -> Result<()> {
         self.write(&frame_name(at), |out| frame.put(out))?;
@@ -156,22 +170,30 @@ impl Checkpoints {
         })
     }
 
-    /// All that is there.
+    /// What is there of a chunk that begins with the frame that is number `start`. Every frame is read, to see that it can be.
     ///
     /// # Errors
     /// [`Error::BadCheckpoint`] for a file that is damaged or of another problem.
-    pub fn left(&self) -> Result<Left> {
+    pub fn left(&self, start: usize) -> Result<Left> {
         let memory = "memory.bin";
         if !self.folder.join(memory).is_file() {
-            return Ok(Left { frames: Vec::new(), carried: None });
+            return Ok(Left { next: start, carried: None });
         }
         let take = |from: &mut Bytes<'_>| {
-            let count = usize::take(from)?;
-            Some((count, Carried { fit: Stored::take(from)?, halved: Stored::take(from)? }))
+            let next = usize::take(from)?;
+            Some((next, Carried { fit: Stored::take(from)?, halved: Stored::take(from)? }))
         };
-        let (count, carried) = self.read(memory, take)?;
-        let frames = (0..count).map(|at| self.read(&frame_name(at), SavedOutcome::take)).collect::<Result<_>>()?;
-        Ok(Left { frames, carried: Some(carried) })
+        let (next, carried) = self.read(memory, take)?;
+        (start..next).try_for_each(|at| self.frame(at).map(drop))?;
+        Ok(Left { next, carried: Some(carried) })
+    }
+
+    /// The frame that is number `at` of the fit.
+    ///
+    /// # Errors
+    /// As [`Checkpoints::left`].
+    pub fn frame(&self, at: usize) -> Result<SavedOutcome> {
+        self.read(&frame_name(at), SavedOutcome::take)
     }
 
     fn write(&self, name: &str, put: impl FnOnce(&mut Vec<u8>)) -> Result<()> {

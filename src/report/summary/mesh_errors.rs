@@ -27,10 +27,14 @@ pub struct MeshErrors {
 }
 
 impl MeshErrors {
-    /// Adds a frame; `steps` and `seconds` are the Newton steps and the wall time of all estimates so far.
-    pub fn add(&mut self, frame: Frame, error: &MeshError, steps: usize, seconds: f64) {
-        self.frames += 1;
+    /// Sets the Newton steps of all estimates and their wall time, s.
+    pub fn took(&mut self, steps: usize, seconds: f64) {
         (self.steps, self.seconds) = (steps, seconds);
+    }
+
+    /// Adds a frame.
+    pub fn add(&mut self, frame: Frame, error: &MeshError) {
+        self.frames += 1;
         keep(&mut self.body, "anywhere", error.largest_mm, frame);
         error.points.iter().for_each(|(name, mm)| keep(&mut self.points, name, *mm, frame));
         error.biases.iter().filter_map(|(name, bias)| Some((name, (*bias)?))).for_each(|(name, bias)| {
@@ -102,11 +106,13 @@ mod tests {
             points: vec![("B1".into(), tip), ("B2".into(), 0.01)],
             biases: vec![("top".into(), Some(bias)), ("low".into(), None)],
         };
-        errors.add(Frame { index: 3, time_s: 0.1 }, &error(0.912, -0.02), 3, 1.0);
+        errors.add(Frame { index: 3, time_s: 0.1 }, &error(0.912, -0.02));
+        errors.took(3, 1.0);
         let one = "  estimated error of the mesh: B1 0.91 mm, B2 0.010 mm, anywhere 1.8 mm; 3 Newton steps on halved \
                    elements, 1.0 s\n  estimated bias of what was fitted, the largest: top -0.020\n";
         assert_eq!(errors.to_string(), one);
-        errors.add(Frame { index: 4, time_s: 0.2 }, &error(0.5, 0.03), 7, 1.5);
+        errors.add(Frame { index: 4, time_s: 0.2 }, &error(0.5, 0.03));
+        errors.took(7, 1.5);
         let two = errors.to_string();
         assert!(two.contains("B1 0.91 mm in frame 3") && two.contains("7 Newton steps"), "{two}");
         assert!(two.contains("top +0.030 in frame 4"), "{two}");

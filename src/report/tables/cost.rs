@@ -22,13 +22,15 @@ pub struct FrameCost {
     pub seconds: f64,
     /// Factorisations of the tangent.
     pub factorisations: usize,
+    /// Whether it started from the frame before, not from rest.
+    pub warm: bool,
 }
 
 /// Writes the table `part,seconds,clock,points,count,flops`: a row per effect that the scene named (seconds summed over
 /// `threads`, quadrature points evaluated), then rows on the `wall` clock for `assembly` (evaluations, which hold the
 /// effects, and assemblies), `factorisation`, `solve` and `output` (solving waited for files), one on the clock of the `writer`, a
-/// thread beside the solver, for `writing`, one for a `warm frame`, the medians of all frames but the first that was solved,
-/// if there are any (`count`: factorisations), and one for `estimate`, the whole of what estimates of the error took, if there
+/// thread beside the solver, for `writing`, one for a `warm frame`, the medians of all frames that started from the one
+/// before, if there are any (`count`: factorisations), and one for `estimate`, the whole of what estimates of the error took, if there
 /// were any: its work and seconds.
 ///
 /// # Errors
@@ -56,7 +58,7 @@ pub fn write_cost(
     wall("factorisation", linear.factor_time.as_secs_f64(), count, flops);
     wall("solve", linear.solve_time.as_secs_f64(), linear.solves.into(), Cell::Empty);
     wall("output", output.waited, Cell::Empty, Cell::Empty);
-    let warm = frames.get(1..).unwrap_or_default();
+    let warm: Vec<&FrameCost> = frames.iter().filter(|frame| frame.warm).collect();
     if !warm.is_empty() {
         let seconds = median(warm.iter().map(|frame| frame.seconds));
         let factorisations = median(warm.iter().map(|frame| frame.factorisations as f64));
