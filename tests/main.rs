@@ -5,6 +5,7 @@
 mod architecture;
 mod bones;
 mod broken;
+mod chunks;
 mod cli;
 mod clips;
 mod common;

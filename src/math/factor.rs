@@ -316,13 +316,16 @@ impl<T: Scalar> Fronts<T> {
         let n = scale.len();
         let order = &tree.permutation;
         x.par_chunks_mut(n * BATCH).for_each(|x| {
+            let columns = x.len() / n;
             let mut permuted = vec![T::default(); x.len()];
-            for (x, permuted) in x.chunks(n).zip(permuted.chunks_mut(n)) {
-                permuted.iter_mut().zip(order).for_each(|(y, &i)| *y = T::round(scale[i] * x[i]));
+            for (column, x) in x.chunks(n).enumerate() {
+                let rows = permuted.iter_mut().skip(column).step_by(columns);
+                rows.zip(order).for_each(|(y, &i)| *y = T::round(scale[i] * x[i]));
             }
-            solve::solve(tree, &self.panels, &mut permuted, x.len() / n);
-            for (x, permuted) in x.chunks_mut(n).zip(permuted.chunks(n)) {
-                permuted.iter().zip(order).for_each(|(y, &i)| x[i] = scale[i] * y.widen());
+            solve::solve(tree, &self.panels, &mut permuted, columns);
+            for (column, x) in x.chunks_mut(n).enumerate() {
+                let rows = permuted.iter().skip(column).step_by(columns);
+                rows.zip(order).for_each(|(y, &i)| x[i] = scale[i] * y.widen());
             }
         });
     }
@@ -375,20 +378,16 @@ fn factor_subtree<T: Scalar>(
     root: usize,
     panels: &mut [Panel<T>],
 ) -> Option<Contribution<T>> {
-    let mut branch = root;
-    while tree.fronts[branch].heavy_children == 1 {
-        branch = tree.fronts[branch].children[0];
-    }
+    let (heavy, next) = tree.branch(root);
     let mut rest = panels;
-    let mut next = tree.fronts[root].first;
-    let mut heavy = Vec::new();
-    for &child in tree.fronts[branch].children.iter().take(tree.fronts[branch].heavy_children) {
-        let (panels, others) = rest.split_at_mut(child + 1 - next);
-        heavy.push((child, panels));
-        (rest, next) = (others, child + 1);
+    let mut parts = Vec::new();
+    for &child in heavy {
+        let (panels, others) = rest.split_at_mut(child + 1 - tree.fronts[child].first);
+        parts.push((child, panels));
+        rest = others;
     }
     let heavy: Vec<_> =
-        heavy.into_par_iter().map(|(child, panels)| factor_subtree(source, tree, child, panels)).collect();
+        parts.into_par_iter().map(|(child, panels)| factor_subtree(source, tree, child, panels)).collect();
     let mut waiting = heavy.into_iter().collect::<Option<Vec<_>>>()?;
     for (f, panel) in (next..=root).zip(rest) {
         let front = &tree.fronts[f];

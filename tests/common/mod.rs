@@ -1,6 +1,7 @@
 //! What the conformance tests share: random numbers, rotations, curved meshes.
 #![allow(dead_code)] // every test file is a crate of its own and uses a part
 
+pub mod clip_run;
 pub mod clips;
 pub mod twin;
 

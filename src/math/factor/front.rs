@@ -293,7 +293,7 @@ fn eliminate<T: Scalar>(front: &Front, panel: &mut Panel<T>, product: &mut [T], 
 
         let pivots = pivots.rb();
         let products = products.subcols_mut(0, len).subrows_mut(start + len, height - start - len);
-        let chunks: Vec<_> = chunks_of_rows(rows).into_iter().zip(chunks_of_rows(products)).enumerate().collect();
+        let chunks: Vec<_> = chunks_of_rows(rows, CHUNK).into_iter().zip(chunks_of_rows(products, CHUNK)).enumerate().collect();
         for_each(is_shared, chunks, |(chunk, (mut rows, product))| {
             let before = before.subrows(len + chunk * CHUNK, rows.nrows());
             matmul(rows.rb_mut(), Accum::Add, before, of_block.transpose(), T::round(-1.0), Par::Seq);
@@ -303,12 +303,12 @@ fn eliminate<T: Scalar>(front: &Front, panel: &mut Panel<T>, product: &mut [T], 
     Some(())
 }
 
-/// The rows of a matrix in pieces of [`CHUNK`].
-fn chunks_of_rows<T>(matrix: MatMut<'_, T>) -> Vec<MatMut<'_, T>> {
+/// The rows of a matrix in pieces of `len`.
+pub(super) fn chunks_of_rows<T>(matrix: MatMut<'_, T>, len: usize) -> Vec<MatMut<'_, T>> {
     let mut chunks = Vec::new();
     let mut rest = matrix;
     while rest.nrows() > 0 {
-        let rows = CHUNK.min(rest.nrows());
+        let rows = len.min(rest.nrows());
         let (chunk, others) = rest.split_at_row_mut(rows);
         chunks.push(chunk);
         rest = others;
@@ -372,7 +372,7 @@ impl<T: Scalar> Inverse<T> {
 }
 
 /// Calls `f` for every item, on all threads if `is_shared`; what an item gets does not depend on it.
-fn for_each<I: Send>(is_shared: bool, items: Vec<I>, f: impl Fn(I) + Sync + Send) {
+pub(super) fn for_each<I: Send>(is_shared: bool, items: Vec<I>, f: impl Fn(I) + Sync + Send) {
     if is_shared {
         items.into_par_iter().for_each(f);
     } else {

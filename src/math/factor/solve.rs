@@ -1,44 +1,130 @@
 //! Forward and backward substitution over the fronts.
+//!
+//! A front has y at its pivots and z at the rows below. On the way up z is what its children gave for these rows, and what is left
+//! of it goes to the parent; on the way down z is the solution there, which the parent has found:
+//!
+//! ```text
+//! up:    y <- L11^-1 y,  z <- z - L21 y,  y <- B^-1 y
+//! down:  y <- L11^-T (y - L21^T z)
+//! ```
+//!
+//! Vectors lie row by row, the numbers of all columns of a row together. As in the factorisation threads share the subtrees, and
+//! the rows and columns of large fronts; who computes what does not change how it is computed.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::{solve_unit_lower_triangular_in_place, solve_unit_upper_triangular_in_place};
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
+use rayon::prelude::*;
 
-use super::front::{Inverse, Panel};
+use super::front::{Inverse, Panel, chunks_of_rows, for_each};
 use super::scalar::Scalar;
 use super::tree::{Front, Tree};
 
-/// x <- (L B L^T)^-1 x for `columns` vectors in the order of elimination, stored one after the other.
+/// Entries of L21 above which its product with a vector is shared among threads: 2 MB of doubles.
+const LEAST_SHARED: usize = 1 << 18;
+/// Rows below the pivots, and pivots, whose products with a vector are computed together.
+const CHUNK: usize = 256;
+const COLUMNS: usize = 32;
+
+/// x <- (L B L^T)^-1 x for `columns` vectors in the order of elimination, row by row.
 pub(super) fn solve<T: Scalar>(tree: &Tree, panels: &[Panel<T>], x: &mut [T], columns: usize) {
-    let n = tree.permutation.len();
-    let largest = |rows: fn(&Front) -> usize| tree.fronts.iter().map(rows).max().unwrap_or(0);
-    let mut pivots = vec![T::default(); largest(Front::width) * columns];
-    let mut below = vec![T::default(); largest(|front| front.below) * columns];
-    for (front, panel) in tree.fronts.iter().zip(panels) {
-        let y = &mut pivots[..front.width() * columns];
-        let z = &mut below[..front.below * columns];
-        copy_pivots(front, x, n, y);
-        forward(front, panel, y, z, columns);
-        for_each_run(front, n, x, z, |x, z| x.iter_mut().zip(z).for_each(|(x, z)| *x -= *z));
-        divide_by_pivots(front, panel, y);
-        write_pivots(front, y, x, n);
+    let substitution = Substitution { tree, panels, columns };
+    let trees = substitution.split(&tree.roots, x).0;
+    trees.into_par_iter().for_each(|(root, x)| {
+        substitution.up(root, x);
+        substitution.down(root, x, Vec::new());
+    });
+}
+
+/// What all fronts read.
+struct Substitution<'a, T> {
+    tree: &'a Tree,
+    panels: &'a [Panel<T>],
+    columns: usize,
+}
+
+impl<T: Scalar> Substitution<'_, T> {
+    /// The parts of `x` of subtrees that follow each other from its beginning, and the rest.
+    fn split<'x>(&self, roots: &[usize], x: &'x mut [T]) -> (Vec<(usize, &'x mut [T])>, &'x mut [T]) {
+        let mut rest = x;
+        let mut parts = Vec::new();
+        for &root in roots {
+            let (part, others) = rest.split_at_mut(self.unknowns(root) * self.columns);
+            parts.push((root, part));
+            rest = others;
+        }
+        (parts, rest)
     }
-    for (front, panel) in tree.fronts.iter().zip(panels).rev() {
-        let y = &mut pivots[..front.width() * columns];
-        let z = &mut below[..front.below * columns];
-        copy_pivots(front, x, n, y);
-        for_each_run(front, n, x, z, |x, z| z.copy_from_slice(x));
-        backward(front, panel, y, z, columns);
-        write_pivots(front, y, x, n);
+
+    /// Number of unknowns that a subtree eliminates.
+    fn unknowns(&self, root: usize) -> usize {
+        let fronts = &self.tree.fronts;
+        fronts[root].pivots.end - fronts[fronts[root].first].pivots.start
+    }
+
+    /// From the leaves of a subtree to its root; gives what is left for the rows below it. `x` are the pivots of the subtree.
+    fn up(&self, root: usize, x: &mut [T]) -> Vec<T> {
+        let (heavy, next) = self.tree.branch(root);
+        let (parts, rest) = self.split(heavy, x);
+        let mut waiting: Vec<Vec<T>> = parts.into_par_iter().map(|(child, x)| self.up(child, x)).collect();
+        let mut rest = rest;
+        for f in next..=root {
+            let front = &self.tree.fronts[f];
+            let (pivots, others) = rest.split_at_mut(front.width() * self.columns);
+            rest = others;
+            let mut local = vec![T::default(); front.height() * self.columns];
+            local[..pivots.len()].copy_from_slice(pivots);
+            let given = waiting.split_off(waiting.len() - front.children.len());
+            for (&child, mut given) in front.children.iter().zip(given) {
+                self.for_each_run(child, &mut given, &mut local, |given, local| {
+                    local.iter_mut().zip(given).for_each(|(l, g)| *l += *g);
+                });
+            }
+            let mut below = local.split_off(pivots.len());
+            forward(front, &self.panels[f], &mut local, &mut below, self.columns);
+            divide_by_pivots(front, &self.panels[f], &mut local, self.columns);
+            pivots.copy_from_slice(&local);
+            waiting.push(below);
+        }
+        waiting.pop().unwrap_or_default()
+    }
+
+    /// From the root of a subtree to its leaves; `below` is the solution at the rows below the root.
+    fn down(&self, root: usize, x: &mut [T], below: Vec<T>) {
+        let (heavy, next) = self.tree.branch(root);
+        let (parts, mut rest) = self.split(heavy, x);
+        let mut waiting = vec![below];
+        for f in (next..=root).rev() {
+            let front = &self.tree.fronts[f];
+            let (others, pivots) = rest.split_at_mut(rest.len() - front.width() * self.columns);
+            rest = others;
+            let below = waiting.pop().unwrap_or_default();
+            backward(front, &self.panels[f], pivots, &below, self.columns);
+            let mut local = [&*pivots, &below].concat();
+            for &child in &front.children {
+                let mut given = vec![T::default(); self.tree.fronts[child].below * self.columns];
+                self.for_each_run(child, &mut given, &mut local, |given, local| given.copy_from_slice(local));
+                waiting.push(given);
+            }
+        }
+        parts.into_par_iter().zip(waiting).for_each(|((child, x), below)| self.down(child, x, below));
+    }
+
+    /// Calls `f` with each run of the rows below a front, in what these rows hold and in what its parent holds.
+    fn for_each_run(&self, front: usize, given: &mut [T], parent: &mut [T], f: impl Fn(&mut [T], &mut [T])) {
+        let c = self.columns;
+        for run in &self.tree.fronts[front].to_parent {
+            f(&mut given[run.from * c..][..run.len * c], &mut parent[run.to * c..][..run.len * c]);
+        }
     }
 }
 
-/// y <- L11^-1 y, z <- L21 y, with the exchanges of each block of pivots before its elimination.
+/// y <- L11^-1 y, z <- z - L21 y, with the exchanges of each block of pivots before its elimination.
 fn forward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &mut [T], columns: usize) {
     let (l11, l21) = panel.blocks(front);
     let width = front.width();
-    let mut y = MatMut::from_column_major_slice_mut(y, width, columns);
+    let mut y = MatMut::from_row_major_slice_mut(y, width, columns);
     let mut before = Vec::new();
     for block in &front.pivot_blocks {
         let (start, len) = (block.start, block.len());
@@ -50,25 +136,23 @@ fn forward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &mut [T],
         }
         let (l, l_later) = l11.submatrix(start, start, width - start, len).split_at_row(len);
         solve_unit_lower_triangular_in_place(l, y.rb_mut(), Par::Seq);
-        matmul(later, Accum::Add, l_later, y.rb(), T::round(-1.0), Par::Seq);
+        subtract_product(l_later, y.rb(), later);
     }
-    let z = MatMut::from_column_major_slice_mut(z, front.below, columns);
-    matmul(z, Accum::Replace, l21, y.rb(), T::round(1.0), Par::Seq);
+    subtract_product(l21, y.rb(), MatMut::from_row_major_slice_mut(z, front.below, columns));
 }
 
 /// y <- L11^-T (y - L21^T z), the exchanges of each block of pivots undone after it.
 fn backward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &[T], columns: usize) {
     let (l11, l21) = panel.blocks(front);
     let width = front.width();
-    let mut y = MatMut::from_column_major_slice_mut(y, width, columns);
-    let z = MatRef::from_column_major_slice(z, front.below, columns);
-    matmul(y.rb_mut(), Accum::Add, l21.transpose(), z, T::round(-1.0), Par::Seq);
+    let mut y = MatMut::from_row_major_slice_mut(y, width, columns);
+    subtract_transposed_product(l21, MatRef::from_row_major_slice(z, front.below, columns), y.rb_mut());
     let mut before = Vec::new();
     for block in front.pivot_blocks.iter().rev() {
         let (start, len) = (block.start, block.len());
         let (mut y, later) = y.rb_mut().subrows_mut(start, width - start).split_at_row_mut(len);
         let (l, l_later) = l11.submatrix(start, start, width - start, len).split_at_row(len);
-        matmul(y.rb_mut(), Accum::Add, l_later.transpose(), later.rb(), T::round(-1.0), Par::Seq);
+        subtract_transposed_product(l_later, later.rb(), y.rb_mut());
         solve_unit_upper_triangular_in_place(l.transpose(), y.rb_mut(), Par::Seq);
         for mut y in y.col_iter_mut() {
             before.clear();
@@ -78,45 +162,39 @@ fn backward<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], z: &[T], co
     }
 }
 
-fn copy_pivots<T: Copy>(front: &Front, x: &[T], n: usize, y: &mut [T]) {
-    let pivots = front.pivots.clone();
-    x.chunks(n).zip(y.chunks_mut(front.width())).for_each(|(x, y)| y.copy_from_slice(&x[pivots.clone()]));
+/// z <- z - L y.
+fn subtract_product<T: Scalar>(l: MatRef<'_, T>, y: MatRef<'_, T>, z: MatMut<'_, T>) {
+    let chunks = chunks_of_rows(z, CHUNK).into_iter().enumerate().collect();
+    for_each(l.nrows() * l.ncols() > LEAST_SHARED, chunks, |(chunk, z)| {
+        let l = l.subrows(chunk * CHUNK, z.nrows());
+        matmul(z, Accum::Add, l, y, T::round(-1.0), Par::Seq);
+    });
 }
 
-fn write_pivots<T: Copy>(front: &Front, y: &[T], x: &mut [T], n: usize) {
-    let pivots = front.pivots.clone();
-    x.chunks_mut(n).zip(y.chunks(front.width())).for_each(|(x, y)| x[pivots.clone()].copy_from_slice(y));
-}
-
-/// Calls `f` with each run of rows below the pivots, in `x` and in `z`, which holds these rows alone.
-fn for_each_run<T>(front: &Front, n: usize, x: &mut [T], z: &mut [T], f: impl Fn(&mut [T], &mut [T])) {
-    if front.below == 0 {
-        return;
-    }
-    for (x, mut rest) in x.chunks_mut(n).zip(z.chunks_mut(front.below)) {
-        for run in &front.below_runs {
-            let (z, others) = rest.split_at_mut(run.len());
-            f(&mut x[run.clone()], z);
-            rest = others;
-        }
-    }
+/// y <- y - L^T z.
+fn subtract_transposed_product<T: Scalar>(l: MatRef<'_, T>, z: MatRef<'_, T>, y: MatMut<'_, T>) {
+    let chunks = chunks_of_rows(y, COLUMNS).into_iter().enumerate().collect();
+    for_each(l.nrows() * l.ncols() > LEAST_SHARED, chunks, |(chunk, y)| {
+        let l = l.subcols(chunk * COLUMNS, y.nrows());
+        matmul(y, Accum::Add, l.transpose(), z, T::round(-1.0), Par::Seq);
+    });
 }
 
 /// y <- B^-1 y.
-fn divide_by_pivots<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T]) {
+fn divide_by_pivots<T: Scalar>(front: &Front, panel: &Panel<T>, y: &mut [T], columns: usize) {
     let (l11, _) = panel.blocks(front);
-    let width = front.width();
     let mut j = 0;
-    while j < width {
+    while j < front.width() {
         let below = panel.subdiagonal[j];
+        let (row, next) = y[j * columns..].split_at_mut(columns);
         if below == T::default() {
             let inverse = T::round(1.0) / l11[(j, j)];
-            y.chunks_mut(width).for_each(|y| y[j] *= inverse);
+            row.iter_mut().for_each(|y| *y *= inverse);
             j += 1;
         } else {
             let inverse = Inverse::new(l11[(j, j)], below, l11[(j + 1, j + 1)]);
-            for y in y.chunks_mut(width) {
-                [y[j], y[j + 1]] = inverse.apply(y[j], y[j + 1]);
+            for (a, b) in row.iter_mut().zip(next) {
+                [*a, *b] = inverse.apply(*a, *b);
             }
             j += 2;
         }

@@ -127,6 +127,18 @@ impl Tree {
         Self::lay_out(pattern, order, &structure, &mut drafts, top)
     }
 
+    /// Where threads part below a front: the first front down from it with two or more heavy children gives them and the front after
+    /// their subtrees, with which those begin that come one after the other. The subtrees lie one after the other from the
+    /// first front on.
+    pub fn branch(&self, root: usize) -> (&[usize], usize) {
+        let mut branch = &self.fronts[root];
+        while branch.heavy_children == 1 {
+            branch = &self.fronts[branch.children[0]];
+        }
+        let heavy = &branch.children[..branch.heavy_children];
+        (heavy, heavy.last().map_or(self.fronts[root].first, |last| last + 1))
+    }
+
     fn lay_out(
         pattern: &BlockPattern,
         order: &[usize],
