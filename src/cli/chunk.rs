@@ -6,7 +6,7 @@ use super::run::Run;
 use super::scout::Scout;
 use crate::error::{Error, Result};
 use crate::fit::Fit;
-use crate::fit::chunks::Chunk;
+use crate::fit::chunks::{Chunk, chunks};
 use crate::forward::{Watch, Work};
 use crate::report::FailedFrame;
 use crate::report::state::{Carried, Checkpoints, Left, SavedFrame, SavedOutcome};
@@ -14,6 +14,31 @@ use crate::report::tables::FrameCost;
 use crate::scene::{ClipSpec, FitSpec, Scene};
 use std::sync::Arc;
 use std::time::Instant;
+
+/// A chunk of the clip and its checkpoints.
+pub(super) struct Part {
+    pub chunk: Chunk,
+    pub checkpoints: Checkpoints,
+}
+
+/// The chunks of a clip, and what an earlier process left of each.
+///
+/// # Errors
+/// [`Error::BadCheckpoint`].
+pub(super) fn parts(spec: &FitSpec, clip: &Clip, checkpoints: &Checkpoints) -> Result<Vec<(Part, Left)>> {
+    let chunks = chunks(spec, &clip.markers, &clip.recording, &clip.frames)?;
+    let part = |(k, chunk): (usize, Chunk)| {
+        let checkpoints = checkpoints.of_chunk(k)?;
+        let left = checkpoints.left(chunk.start)?;
+        Ok((Part { chunk, checkpoints }, left))
+    };
+    chunks.into_iter().enumerate().map(part).collect()
+}
+
+/// Frames of the clip that an earlier process has done.
+pub(super) fn done(parts: &[(Part, Left)]) -> usize {
+    parts.iter().map(|(part, left)| left.next.saturating_sub(part.chunk.first)).sum()
+}
 
 /// What every chunk is fitted to and with.
 pub(super) struct Job<'a> {
@@ -72,8 +97,8 @@ impl<'a> Bench<'a> {
     pub fn work(
         &mut self,
         job: &Job<'_>,
-        chunk: &Chunk,
-        (checkpoints, left): (&Checkpoints, Left),
+        Part { chunk, checkpoints }: &Part,
+        left: Left,
         tell: &mut dyn FnMut(Done) -> bool,
     ) -> Result<bool> {
         let Left { next, carried } = left;

@@ -1,6 +1,6 @@
 //! `risorius resume RUN`: goes on after Ctrl-C, a crash or a full disk.
 
-use super::fit::{done, parts};
+use super::chunk::{done, parts};
 use super::prepare::prepare;
 use super::problem::Source;
 use super::run::{self, Run};

@@ -293,7 +293,8 @@ fn eliminate<T: Scalar>(front: &Front, panel: &mut Panel<T>, product: &mut [T], 
 
         let pivots = pivots.rb();
         let products = products.subcols_mut(0, len).subrows_mut(start + len, height - start - len);
-        let chunks: Vec<_> = chunks_of_rows(rows, CHUNK).into_iter().zip(chunks_of_rows(products, CHUNK)).enumerate().collect();
+        let chunks: Vec<_> =
+            chunks_of_rows(rows, CHUNK).into_iter().zip(chunks_of_rows(products, CHUNK)).enumerate().collect();
         for_each(is_shared, chunks, |(chunk, (mut rows, product))| {
             let before = before.subrows(len + chunk * CHUNK, rows.nrows());
             matmul(rows.rb_mut(), Accum::Add, before, of_block.transpose(), T::round(-1.0), Par::Seq);
