@@ -76,7 +76,16 @@ fn force(host: &Mesh, muscle: &Muscle) -> Vec<f64> {
     let mut all = Vec::new();
     for element in 0..host.elements() {
         let (local, u, p) = (host.local_of(element, &x), [[0.0; 64]; 3], [0.0; MAX_PRESSURES]);
-        let state = ElementState { element, x: &local, u: &u, p: &p, controls: &[0.05], load: 1.0, multipliers: &[] };
+        let state = ElementState {
+            element,
+            x: &local,
+            u: &u,
+            p: &p,
+            controls: &[0.05],
+            load: 1.0,
+            easing: 0.0,
+            multipliers: &[],
+        };
         let mut system = ElementSystem::default();
         muscle.add(&state, Want::Force, &mut system);
         all.extend(system.force.iter().flatten().copied());

@@ -69,6 +69,7 @@ impl Meter {
             let told = match kind {
                 StepKind::Walked => format!("{way:.3} % of the way: {taken} iterations"),
                 StepKind::Snapped => format!("{way:.3} % of the way: let go, {taken} iterations"),
+                StepKind::Hardened => format!("contact is hardened: {taken} iterations"),
                 StepKind::Failed => format!(
                     "{way:.3} % of the way: not found, {taken} iterations, residual {residual:.1e} of {required:.1e} mN"
                 ),

@@ -70,6 +70,8 @@ pub(super) struct Balance<'m> {
     pub off_surface: Option<OffSurface>,
     /// Holds the body back while it is let go.
     pub drag: Option<Drag>,
+    /// By how much contact is eased, mm.
+    pub easing: f64,
     work: Work,
 }
 
@@ -122,6 +124,7 @@ impl<'m> Balance<'m> {
             worst: WorstPoint { min: 1.0, element: 0, point: 0, max: 1.0 },
             off_surface: None,
             drag: None,
+            easing: 0.0,
             work: Work { points: vec![0; terms], term_seconds: vec![0.0; terms], ..Work::default() },
         })
     }
@@ -131,9 +134,9 @@ impl<'m> Balance<'m> {
         self.target = target;
     }
 
-    /// A state with the controls and the load of the target; prescribed motion may still be outstanding.
+    /// A state with the controls and the load of the target, contact as it is eased now; prescribed motion may still be outstanding.
     pub fn at_target(&self, state: State) -> State {
-        State { controls: self.target.controls.clone(), load: self.target.load, ..state }
+        State { controls: self.target.controls.clone(), load: self.target.load, easing: self.easing, ..state }
     }
 
     /// The same with the faces on bones where they belong. For a guess: far from there it may be inadmissible.
@@ -496,6 +499,7 @@ impl Equations for Balance<'_> {
 
     fn assess(&mut self, state: &State) -> Assessment {
         debug_assert!(state.controls == self.target.controls && state.load == self.target.load);
+        debug_assert!(state.easing == self.easing);
         let evaluation = self.evaluate(state, Want::Force, None);
         self.gap = self.outstanding(state);
         self.worst = evaluation.det_f;

@@ -29,6 +29,11 @@ const LIMITS: Limits = Limits { iterations: 30, damping: DAMPING, test: Test::Mo
 /// Residual, in relation to the element forces, of the states on the way with contact to the equilibrium that is asked for: each is no more than
 /// the guess for the next.
 const ON_THE_WAY: f64 = 1e-3;
+/// By how much contact is eased on a path, as a part of an element.
+const EASING: f64 = 0.125;
+/// To this part the range over which it sets in is narrowed at once, and the part that is too little to go on with.
+const HARDENED: f64 = 0.2;
+const HARDENED_LEAST: f64 = 0.8;
 /// Corrections with the tangent at hand before a new one is made.
 const CHORD_ITERATIONS: usize = 8;
 /// Iterations that a guess is given before the path is walked instead.
@@ -105,6 +110,8 @@ pub enum StepKind {
     Walked,
     /// The body was let go where the path turned back, or left a saddle: see [`Snap`].
     Snapped,
+    /// Contact that was eased on the path sets in over a narrower range.
+    Hardened,
     /// It did not converge.
     Failed,
 }
@@ -115,6 +122,7 @@ impl StepKind {
         match self {
             StepKind::Walked => "walked",
             StepKind::Snapped => "snapped",
+            StepKind::Hardened => "hardened",
             StepKind::Failed => "failed",
         }
     }
@@ -163,6 +171,9 @@ pub struct Solver<'m> {
     settings: Settings,
     watch: Option<Watch>,
 }
+
+/// The end of a path, the steps to it, and where the body snapped.
+type Walked = (State, Vec<Step>, Vec<Snap>);
 
 /// Sees every step of every path when it is done, those that failed and were cut too.
 pub type Watch = Arc<dyn Fn(&Step) + Send + Sync>;
@@ -247,14 +258,25 @@ impl<'m> Solver<'m> {
     }
 
     /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`. Where the
-    /// path turns back or comes to a saddle, the body is let go: see [`Snap`].
+    /// path turns back or comes to a saddle, the body is let go: see [`Snap`]. Contact that may be eased is walked into softly
+    /// and then hardened.
     ///
     /// # Errors
     /// [`Failure`] with the last equilibrium that was found on the path.
     pub fn equilibrium(&mut self, from: &State, to: &Drive) -> std::result::Result<Equilibrium, Box<Failure>> {
         // where points of contact open and close, the last digits of a state on the way are dear
+        let loose = self.settings.tolerance.max(ON_THE_WAY);
+        if let Some(range) = self.balance.model.eases() {
+            let eased = self.eased(from, to, loose, range);
+            self.balance.easing = 0.0;
+            if let Some((state, history)) = eased
+                && let Ok(found) = self.close_gaps(state, history, Vec::new())
+            {
+                return Ok(found);
+            }
+        }
         if self.balance.model.contacts().next().is_some() {
-            let found = self.follow(from, to, self.settings.tolerance.max(ON_THE_WAY));
+            let found = self.follow(from, to, loose);
             if let Ok(found) = found
                 && found.negative_modes.unwrap_or(0) == 0
             {
@@ -265,13 +287,60 @@ impl<'m> Solver<'m> {
         self.follow(from, to, self.settings.tolerance)
     }
 
-    /// The same with states on the way that are balanced to `on_the_way`. Where they are looser than the end, no body is let go.
+    /// The same along the path with contact that sets in over a wider range, which is then narrowed to the `range` of its law. `None`
+    /// where that does not lead to a stable equilibrium.
+    fn eased(&mut self, from: &State, to: &Drive, loose: f64, range: f64) -> Option<(State, Vec<Step>)> {
+        self.balance.easing = EASING * self.balance.model.element_size();
+        let (mut state, mut history, snaps) = self.walk_path(from, to, [loose; 2]).ok()?;
+        if !snaps.is_empty() {
+            return None;
+        }
+        self.balance.set_target(to.clone());
+        let limits = Limits { iterations: NEAR_ITERATIONS, ..LIMITS };
+        let mut part = HARDENED;
+        while self.balance.easing > 0.0 {
+            let before = self.balance.easing;
+            let left = part * (before + range) - range;
+            self.balance.easing = if left > range { left } else { 0.0 };
+            self.balance.tolerance = if left > range { loose } else { self.settings.tolerance };
+            match self.attempt(state.clone(), &state, limits).ok()? {
+                Outcome { state: hard, last, iterations, stop: None } => {
+                    history.push(self.seen(step(1.0, StepKind::Hardened, last, iterations)));
+                    (state, part) = (hard, HARDENED);
+                }
+                Outcome { last, iterations, .. } => {
+                    self.seen(step(1.0, StepKind::Failed, last, iterations));
+                    self.balance.count_cut();
+                    (self.balance.easing, part) = (before, part.sqrt());
+                    if part > HARDENED_LEAST {
+                        return None;
+                    }
+                }
+            }
+        }
+        (self.balance.negative_modes() == Some(0)).then_some((state, history))
+    }
+
+    /// The same with states on the way that are balanced to `on_the_way`.
     fn follow(
         &mut self,
         from: &State,
         to: &Drive,
         on_the_way: f64,
     ) -> std::result::Result<Equilibrium, Box<Failure>> {
+        let (state, history, snaps) = self.walk_path(from, to, [on_the_way, self.settings.tolerance])?;
+        self.balance.set_target(to.clone());
+        self.close_gaps(state, history, snaps)
+    }
+
+    /// The end of the path, the steps to it and where the body snapped. States on the way are balanced to the first tolerance, the
+    /// last one to the second; where those on the way are looser than settings ask for, no body is let go.
+    fn walk_path(
+        &mut self,
+        from: &State,
+        to: &Drive,
+        [on_the_way, end]: [f64; 2],
+    ) -> std::result::Result<Walked, Box<Failure>> {
         let loose = on_the_way > self.settings.tolerance;
         let start = Drive { controls: from.controls.clone(), load: from.load };
         let (warp, limits) = self.walk(&start, to);
@@ -286,7 +355,7 @@ impl<'m> Solver<'m> {
         let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
-            self.balance.tolerance = if place < 1.0 { on_the_way } else { self.settings.tolerance };
+            self.balance.tolerance = if place < 1.0 { on_the_way } else { end };
             let guess = match &before {
                 Some((earlier, state)) => {
                     let ratio = (place - stepper.reached()) / (stepper.reached() - earlier);
@@ -368,8 +437,7 @@ impl<'m> Solver<'m> {
                 }
             }
         }
-        self.balance.set_target(to.clone());
-        self.close_gaps(last, history, snaps)
+        Ok((last, history, snaps))
     }
 
     /// Uzawa's method: multipliers and balance in turn, until every constraint is as closed as it should be.
@@ -488,7 +556,7 @@ impl<'m> Solver<'m> {
         }
         // Newton's method factorises the states before its solution; where there was one at most, that is a guess
         let unseen = match outcome.iterations.len() {
-            0 => outcome.state.controls != last.controls,
+            0 => outcome.state.controls != last.controls || outcome.state.easing != last.easing,
             1 => true,
             _ => false,
         };

@@ -197,7 +197,8 @@ impl Parts<'_> {
         for (term, coupling) in couplings {
             let start = Instant::now();
             let x = x.get_or_insert_with(|| current(self.mesh, state));
-            let body = BodyState { mesh: self.mesh, x, load: state.load, multipliers: &state.multipliers[term] };
+            let (load, easing) = (state.load, state.easing);
+            let body = BodyState { mesh: self.mesh, x, load, easing, multipliers: &state.multipliers[term] };
             let coupled = coupling.add(&body, want);
             evaluation.seconds[term] += start.elapsed().as_secs_f64();
             evaluation.energies[term] += coupled.energy;
@@ -271,6 +272,7 @@ impl Parts<'_> {
             p: &local.p,
             controls: &state.controls,
             load: state.load,
+            easing: state.easing,
             multipliers: &[],
         };
         work.system.clear(want);

@@ -162,6 +162,15 @@ impl Model {
         self.terms().iter().enumerate().filter_map(move |(index, term)| Some((index, allows(term.as_ref())?)))
     }
 
+    /// The narrowest range, mm, over which a contact sets in that may be eased; `None` where none may.
+    pub fn eases(&self) -> Option<f64> {
+        let ranges = self.terms().iter().filter_map(|term| match (term.as_contact(), term.as_coupling()) {
+            (Some(contact), _) => contact.eases(),
+            (_, coupling) => coupling?.eases(),
+        });
+        ranges.min_by(f64::total_cmp)
+    }
+
     /// All quadrature points of a sliding or contact at a state; none for another term.
     pub fn contact_points(&self, state: &State, term: usize) -> Vec<ContactPoint> {
         if let Some(coupling) = self.terms()[term].as_coupling() {
@@ -259,6 +268,7 @@ impl Model {
             p: vec![0.0; self.numbering.pressures()],
             controls: vec![0.0; self.controls().len()],
             load: 0.0,
+            easing: 0.0,
             multipliers: self
                 .terms()
                 .iter()
@@ -351,7 +361,7 @@ impl Model {
     /// Calls `f` with the body as a coupling sees it.
     fn with_body<R>(&self, state: &State, term: usize, f: impl FnOnce(&BodyState<'_>) -> R) -> R {
         let (x, multipliers) = (self.current(state), &state.multipliers[term]);
-        f(&BodyState { mesh: self.mesh(), x: &x, load: state.load, multipliers })
+        f(&BodyState { mesh: self.mesh(), x: &x, load: state.load, easing: state.easing, multipliers })
     }
 
     /// Adds the forces of pairs of faces to those on the unknowns.
@@ -391,6 +401,7 @@ impl Model {
             p: &local.p,
             controls: &state.controls,
             load: state.load,
+            easing: state.easing,
             multipliers: &[],
         })
     }

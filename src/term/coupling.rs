@@ -19,6 +19,8 @@ pub struct BodyState<'a> {
     pub x: &'a [Vector],
     /// Factor on loads, 0 to 1 along the load path.
     pub load: f64,
+    /// By how much contact sets in more slowly than its law says, mm.
+    pub easing: f64,
     /// The multipliers of the coupling; empty for one that has none.
     pub multipliers: &'a [f64],
 }
@@ -48,6 +50,9 @@ pub struct Coupled {
 pub trait Coupling: Send + Sync {
     /// Quadrature points: a count of work.
     fn points(&self) -> usize;
+
+    /// See [`ContactLaw::eases`](super::contact::law::ContactLaw::eases).
+    fn eases(&self) -> Option<f64>;
 
     /// Pairs of faces that are so near at rest that they may be expected to meet: a hint for the order of elimination.
     fn neighbours(&self) -> &[[Face; 2]];

@@ -37,6 +37,8 @@ pub struct ElementState<'a> {
     pub controls: &'a [f64],
     /// Factor on loads, 0 to 1 along the load path.
     pub load: f64,
+    /// By how much contact sets in more slowly than its law says, mm.
+    pub easing: f64,
     /// The multipliers of the term that is asked, over all elements; empty for a term that has none.
     pub multipliers: &'a [f64],
 }

@@ -28,7 +28,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
 /// First bytes of a checkpoint.
-const MAGIC: &[u8; 16] = b"risorius state 4";
+const MAGIC: &[u8; 16] = b"risorius state 5";
 
 /// What a fit is of.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -16,7 +16,7 @@ use crate::report::frame::MeshError;
 use crate::report::status::FailedFrame;
 use crate::solve::newton::Iteration;
 
-stored!(State { u, p, controls, load, multipliers });
+stored!(State { u, p, controls, load, easing, multipliers });
 stored!(WorstPoint { min, element, point, max });
 stored!(Evaluation { energies, seconds, det_f, force, residual, magnitude, lifted });
 stored!(Iteration { residual, required, factor, corrections });
@@ -58,12 +58,14 @@ stored!(Estimate {
 
 impl Stored for StepKind {
     fn put(&self, out: &mut Vec<u8>) {
-        let kinds = [StepKind::Walked, StepKind::Snapped, StepKind::Failed];
+        let kinds = [StepKind::Walked, StepKind::Snapped, StepKind::Hardened, StepKind::Failed];
         out.extend(kinds.iter().position(|kind| kind == self).map(|at| at as u8));
     }
 
     fn take(from: &mut Bytes<'_>) -> Option<StepKind> {
-        [StepKind::Walked, StepKind::Snapped, StepKind::Failed].get(usize::from(u8::take(from)?)).copied()
+        [StepKind::Walked, StepKind::Snapped, StepKind::Hardened, StepKind::Failed]
+            .get(usize::from(u8::take(from)?))
+            .copied()
     }
 }
 

@@ -136,6 +136,11 @@ impl Contact {
         self.interface.allows
     }
 
+    /// See [`ContactLaw::eases`].
+    pub fn eases(&self) -> Option<f64> {
+        self.interface.law.eases()
+    }
+
     /// The elements of the host that it acts on.
     pub fn elements(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.of_element.len()).filter(|element| !self.of_element[*element].is_empty())
@@ -181,7 +186,7 @@ impl Contact {
             None => Gap { value: f64::NAN, normal: [f64::NAN; 3], curvature: [[f64::NAN; 3]; 3] },
         };
         let multiplier = state.multipliers.get(index).copied().unwrap_or(0.0);
-        Some((gap, self.interface.law.response(gap.value, self.interface.allows, multiplier)))
+        Some((gap, self.interface.law.eased(state.easing, gap.value, self.interface.allows, multiplier)))
     }
 }
 

@@ -138,7 +138,7 @@ impl Mutual {
             manner,
         };
         contact.points = contact.lay_points(mesh, gauss);
-        let body = BodyState { mesh, x: &mesh.parameters, load: 1.0, multipliers: &[] };
+        let body = BodyState { mesh, x: &mesh.parameters, load: 1.0, easing: 0.0, multipliers: &[] };
         let mut near = Vec::new();
         for (index, opposite) in contact.opposites(&body).into_iter().enumerate() {
             let Opposite::Foot(foot) = opposite else { continue };
@@ -243,7 +243,7 @@ impl Mutual {
     fn response(&self, index: usize, gap: f64, body: &BodyState<'_>) -> Response {
         let gap = gap - (1.0 - body.load) * self.points[index].relaxed;
         let multiplier = body.multipliers.get(index).copied().unwrap_or(0.0);
-        self.manner.law.response(gap, Allows::ClosedOrOpen, multiplier)
+        self.manner.law.eased(body.easing, gap, Allows::ClosedOrOpen, multiplier)
     }
 
     /// Calls `f` for every point that has a face opposite, with its index and foot.
@@ -346,6 +346,10 @@ fn sizes(mesh: &Mesh, faces: &[Face]) -> (f64, f64) {
 impl Coupling for Mutual {
     fn points(&self) -> usize {
         self.points.len()
+    }
+
+    fn eases(&self) -> Option<f64> {
+        self.manner.law.eases()
     }
 
     fn neighbours(&self) -> &[[Face; 2]] {

@@ -21,6 +21,14 @@ impl ContactLaw for Smooth {
         "smooth"
     }
 
+    fn eases(&self) -> Option<f64> {
+        Some(self.range)
+    }
+
+    fn eased(&self, easing: f64, gap: f64, allows: Allows, multiplier: f64) -> Response {
+        Smooth { range: self.range + easing, ..*self }.response(gap, allows, multiplier)
+    }
+
     fn stiffness(&self) -> f64 {
         self.stiffness
     }
