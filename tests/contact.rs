@@ -161,11 +161,21 @@ fn laws_have_exact_derivatives() {
     const H: f64 = 1e-4;
     for (law, kinds) in laws() {
         for allows in kinds {
-            for multiplier in [0.0, -3.0] {
+            for (multiplier, easing) in [(0.0, 0.0), (-3.0, 0.0), (0.0, 0.7)] {
                 for gap in [-1.5, -0.2, 0.01, 0.3, 1.1, 1.9, 2.5] {
-                    let at = |step: f64| law.response(gap + step * H, allows, multiplier);
+                    let at = |step: f64| law.eased(easing, gap + step * H, allows, multiplier);
                     let here = at(0.0);
-                    let what = format!("{} {allows:?} at {gap} with {multiplier}: {here:?}", law.name());
+                    let what =
+                        format!("{} {allows:?} at {gap} with {multiplier}, eased by {easing}: {here:?}", law.name());
+                    let plain = law.response(gap, allows, multiplier);
+                    if easing == 0.0 || law.eases().is_none() {
+                        assert!(here == plain || here.energy.is_nan(), "{what}: {plain:?}");
+                    } else {
+                        assert!(
+                            here.energy <= plain.energy && here.slope.abs() <= plain.slope.abs(),
+                            "{what}: {plain:?}"
+                        );
+                    }
                     if law.name() == "barrier" && gap < 0.0 {
                         assert!(here.energy.is_nan() && here.slope.is_nan(), "{what}: never admitted");
                         continue;

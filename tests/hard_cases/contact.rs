@@ -1,6 +1,7 @@
 //! Contact that opens and closes at very few points.
 
 use super::record::{difference, drive, solver, stable};
+use risorius::forward::StepKind;
 use risorius::model::build::build;
 use risorius::report::contact_states;
 use risorius::scene::Scene;
@@ -38,6 +39,7 @@ fn contact_at_few_points_opens_and_closes_without_chatter() {
         ("penalty = { kpa_per_mm = 20 }", 0.2),
         ("augmented = { kpa_per_mm = 20, gap_mm = 1e-4 }", 1e-4),
         ("barrier = { kpa_per_mm = 20, range_mm = 0.04 }", 0.0),
+        ("smooth = { kpa_per_mm = 20, range_mm = 0.05 }", 0.2),
     ] {
         let name = law.split(' ').next().unwrap_or_default();
         let model = build(&block_over_a_sphere(law)).unwrap_or_else(|error| panic!("{error}")).model;
@@ -62,4 +64,28 @@ fn contact_at_few_points_opens_and_closes_without_chatter() {
             state = lifted.state;
         }
     }
+}
+
+/// Contact that was eased on the way is that of its law in the end, and the state the one that Newton's method finds without.
+#[test]
+fn eased_contact_ends_as_its_law_says() {
+    let model = build(&block_over_a_sphere("smooth = { kpa_per_mm = 20, range_mm = 0.05 }")).expect("a model").model;
+    let mut solver = solver(&model);
+    let pressed = stable("eased", &mut solver, &model.rest(), &drive(&[], 1.0));
+    let kinds: Vec<StepKind> = pressed.history.iter().map(|step| step.kind).collect();
+    let hardened = kinds.iter().position(|kind| *kind == StepKind::Hardened).expect("contact is hardened");
+    assert!(hardened > 0 && kinds[..hardened].iter().all(|kind| *kind == StepKind::Walked), "{kinds:?}");
+    assert!(kinds[hardened..].iter().all(|kind| *kind == StepKind::Hardened), "{kinds:?}");
+    assert_eq!(pressed.state.easing, 0.0);
+    let again = solver.equilibrium_near(&pressed.state, &pressed.state, &drive(&[], 1.0)).expect("an equilibrium");
+    assert_eq!(again.state, pressed.state);
+    // from nearby there is nothing to ease
+    let less = stable("less", &mut solver, &pressed.state, &drive(&[], 0.98));
+    let near = solver.equilibrium_near(&less.state, &less.state, &drive(&[], 1.0)).expect("an equilibrium");
+    assert!(near.history.iter().all(|step| step.kind == StepKind::Walked));
+    let apart = difference(&near.state, &pressed.state);
+    assert!(apart < 1e-6, "{apart:.1e}");
+    let eased = risorius::model::State { easing: 0.5, ..pressed.state.clone() };
+    let [hard, soft] = [&pressed.state, &eased].map(|state| contact_states(&model, state)[0].force[2]);
+    assert!(soft < 0.5 * hard, "{soft} of {hard}");
 }
