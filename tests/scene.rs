@@ -3,8 +3,9 @@
 use proptest::prelude::*;
 use risorius::cli::diagnostics::{render_error, render_warning};
 use risorius::scene::{
-    ActivationSpec, BlockSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec, FramesSpec,
-    GeometrySpec, LawSpec, LoadKind, PartSpec, RegisterSpec, Scene, SupportKind, SurfaceSpec, Task, TieSpec, Units,
+    ActivationSpec, BlockSpec, ChunksSpec, ControlRange, ControlValue, Curves, FaceName, FaceSpec, FibresSpec,
+    FramesSpec, GeometrySpec, LawSpec, LoadKind, PartSpec, RegisterSpec, Scene, SupportKind, SurfaceSpec, Task,
+    TieSpec, Units,
 };
 use risorius::{Error, Result};
 use std::path::Path;
@@ -418,8 +419,16 @@ fn a_lock_file_is_the_same_problem_from_any_folder() {
     let again = Scene::parse(&lock, "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();
     assert_eq!(content(&scene), content(&again));
     assert_eq!(lock, again.lock());
-    for default in ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""] {
+    let defaults = ["zero_is_missing = true", "max_iterations = 30", "every = 1", "element = \"trilinear\""];
+    for default in defaults.into_iter().chain(["chunks = { count = 1, overlap = 5 }"]) {
         assert!(lock.contains(default), "{default} is not in\n{lock}");
+    }
+    for (asked, count, overlap) in [("3", 3, 5), ("{ count = 2, overlap = 9 }", 2, 9)] {
+        let scene = parse(WHOLE, &[&format!("fit.chunks={asked}")]).unwrap();
+        let again = Scene::parse(&scene.lock(), "problem.lock.toml", Path::new("/another/folder"), &[]).unwrap();
+        for scene in [scene, again] {
+            assert_eq!(scene.fit.expect("a fit").chunks, ChunksSpec { count, overlap });
+        }
     }
     for head in ["{ bone_markers = [\"brow.L\", \"b\", \"c\"] }", "{ pose_topic = \"/head\" }", "{ estimate = true }"]
     {
