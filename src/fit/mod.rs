@@ -7,8 +7,9 @@
 //! Each frame is a Gauss-Newton iteration ([`gauss_newton`]) run by argmin, each step a box-constrained quadratic program
 //! solved by Clarabel ([`bounded_step`]), on sensitivities by the implicit function theorem or by finite differences
 //! ([`sensitivity`]). Before the first, the recording is brought to the model ([`registration`]). Frames follow each other
-//! warm ([`sequence`]), side by side in [`chunks`], and may then be smoothed all at once ([`smoother`]); [`covariance`] and [`identifiability`] say how far
-//! an answer can be believed, [`advise`] which further markers would tell more. [`outer`] finds what all frames share.
+//! warm ([`sequence`]), in [`chunks`] side by side, and may then be smoothed all at once ([`smoother`]); [`covariance`] and
+//! [`identifiability`] say how far an answer can be believed, [`advise`] which further markers would tell more. [`outer`] finds
+//! what all frames share.
 
 pub mod advise;
 pub mod bias;

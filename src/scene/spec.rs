@@ -803,7 +803,7 @@ pub struct FitSpec {
     pub max_marker_distance_mm: f64,
     /// Which frames of the recording are fitted.
     pub frames: FramesSpec,
-    /// How many of them are fitted one after the other.
+    /// In how many parts they are fitted, side by side.
     pub chunks: ChunksSpec,
     /// How the recording is brought to the model.
     pub registration: RegistrationSpec,
