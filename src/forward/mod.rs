@@ -243,7 +243,7 @@ impl<'m> Solver<'m> {
         }
         let limits = Limits { iterations: self.settings.max_iterations.min(NEAR_ITERATIONS), ..LIMITS };
         self.balance.keeps_factor = true;
-        let near = self.solve(guess, limits);
+        let near = self.solve(guess.clone(), limits);
         self.balance.keeps_factor = false;
         if let Ok(outcome) = near {
             let stable = self.balance.negative_modes().unwrap_or(0) == 0;
@@ -254,7 +254,21 @@ impl<'m> Solver<'m> {
                 }
             }
         }
+        if let Some(range) = self.balance.model.eases() {
+            let eased = self.eased_near(&guess, self.on_the_way(), range);
+            self.balance.easing = 0.0;
+            if let Some((state, history)) = eased
+                && let Ok(found) = self.close_gaps(state, history, Vec::new())
+            {
+                return Ok(found);
+            }
+        }
         self.equilibrium(from, to)
+    }
+
+    /// The residual of states on the way with contact: where points open and close, their last digits are dear.
+    fn on_the_way(&self) -> f64 {
+        self.settings.tolerance.max(ON_THE_WAY)
     }
 
     /// The equilibrium at `to`, sought along the straight path of controls and load from the equilibrium `from`. Where the
@@ -264,8 +278,7 @@ impl<'m> Solver<'m> {
     /// # Errors
     /// [`Failure`] with the last equilibrium that was found on the path.
     pub fn equilibrium(&mut self, from: &State, to: &Drive) -> std::result::Result<Equilibrium, Box<Failure>> {
-        // where points of contact open and close, the last digits of a state on the way are dear
-        let loose = self.settings.tolerance.max(ON_THE_WAY);
+        let loose = self.on_the_way();
         if let Some(range) = self.balance.model.eases() {
             let eased = self.eased(from, to, loose, range);
             self.balance.easing = 0.0;
@@ -291,11 +304,40 @@ impl<'m> Solver<'m> {
     /// where that does not lead to a stable equilibrium.
     fn eased(&mut self, from: &State, to: &Drive, loose: f64, range: f64) -> Option<(State, Vec<Step>)> {
         self.balance.easing = EASING * self.balance.model.element_size();
-        let (mut state, mut history, snaps) = self.walk_path(from, to, [loose; 2]).ok()?;
+        let (state, history, snaps) = self.walk_path(from, to, [loose; 2]).ok()?;
         if !snaps.is_empty() {
             return None;
         }
         self.balance.set_target(to.clone());
+        self.hardened(state, history, loose, range)
+    }
+
+    /// The same from a guess of the eased equilibrium instead of along a path.
+    fn eased_near(&mut self, guess: &State, loose: f64, range: f64) -> Option<(State, Vec<Step>)> {
+        self.balance.easing = EASING * self.balance.model.element_size();
+        self.balance.tolerance = loose;
+        let limits = Limits { iterations: NEAR_ITERATIONS, ..LIMITS };
+        match self.attempt(guess.clone(), guess, limits).ok()? {
+            Outcome { state, last, iterations, stop: None } => {
+                let history = vec![self.seen(step(1.0, StepKind::Walked, last, iterations))];
+                self.hardened(state, history, loose, range)
+            }
+            Outcome { last, iterations, .. } => {
+                self.seen(step(1.0, StepKind::Failed, last, iterations));
+                self.balance.count_cut();
+                None
+            }
+        }
+    }
+
+    /// Narrows contact that is eased to the `range` of its law, from one state to the next.
+    fn hardened(
+        &mut self,
+        mut state: State,
+        mut history: Vec<Step>,
+        loose: f64,
+        range: f64,
+    ) -> Option<(State, Vec<Step>)> {
         let limits = Limits { iterations: NEAR_ITERATIONS, ..LIMITS };
         let mut part = HARDENED;
         while self.balance.easing > 0.0 {
