@@ -392,8 +392,6 @@ impl<'m> Solver<'m> {
         let mut last = from.clone();
         let mut before: Option<(f64, State)> = None;
         let mut modes = 0;
-        // whether the last equilibrium is balanced as the end will be
-        let mut exact = true;
         let limits = Limits { iterations: self.settings.max_iterations, ..LIMITS };
         while let Some(place) = stepper.next() {
             self.balance.set_target(between(&start, to, warp.place(place)));
@@ -433,7 +431,6 @@ impl<'m> Solver<'m> {
                         continue;
                     }
                     modes = modes.max(found);
-                    exact = !loose;
                     stepper.succeeded(place, outcome.iterations.len());
                     history.push(self.seen(step(place, StepKind::Walked, outcome.last, outcome.iterations)));
                     before = Some((earlier, std::mem::replace(&mut last, outcome.state)));
@@ -441,15 +438,6 @@ impl<'m> Solver<'m> {
                 Some(stop) => {
                     self.balance.count_cut();
                     let failed = self.seen(step(place, StepKind::Failed, outcome.last, outcome.iterations.clone()));
-                    if !exact {
-                        // a loose state may lie on a kink, from which no step leads on
-                        self.balance.set_target(Drive { controls: last.controls.clone(), load: last.load });
-                        self.balance.tolerance = self.settings.tolerance;
-                        if let Ok(Outcome { state, stop: None, .. }) = self.attempt(last.clone(), &last, limits) {
-                            last = state;
-                        }
-                        (exact, before) = (true, None);
-                    }
                     if stepper.failed() {
                         continue;
                     }
