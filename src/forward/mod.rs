@@ -219,8 +219,8 @@ impl<'m> Solver<'m> {
         self.balance.work()
     }
 
-    /// The equilibrium at `to`, sought from a guess of it: a state whose unknowns are near. Where that fails, along the
-    /// path from the equilibrium `from`.
+    /// The equilibrium at `to`, sought from a guess of it: a state whose unknowns are near. Where that fails, the same with
+    /// contact that is eased first; where that fails too, along the path from the equilibrium `from`.
     ///
     /// # Errors
     /// As [`Solver::equilibrium`].
