@@ -95,13 +95,13 @@ fn eased_contact_ends_as_its_law_says() {
 fn contact_is_eased_near_a_guess() {
     let model =
         build(&block_over_a_sphere("smooth = { kpa_per_mm = 2000, range_mm = 0.005 }")).expect("a model").model;
-    let mut solver = solver(&model);
-    let near = solver.equilibrium_near(&model.rest(), &model.rest(), &drive(&[], 1.0)).expect("an equilibrium");
+    let lifted = stable("lifted", &mut solver(&model), &model.rest(), &drive(&[], -1.0)).state;
+    let near = solver(&model).equilibrium_near(&model.rest(), &lifted, &drive(&[], 1.0)).expect("an equilibrium");
     let steps: Vec<(StepKind, f64)> = near.history.iter().map(|step| (step.kind, step.place)).collect();
     assert_eq!(steps[0], (StepKind::Walked, 1.0), "{steps:?}");
     assert!(steps.len() > 1 && steps[1..].iter().all(|step| step.0 == StepKind::Hardened), "{steps:?}");
     assert_eq!(near.state.easing, 0.0);
-    let walked = stable("walked", &mut solver, &model.rest(), &drive(&[], 1.0));
+    let walked = stable("walked", &mut solver(&model), &lifted, &drive(&[], 1.0));
     assert!(walked.history[0].place < 1.0, "the path has more steps than one");
     let apart = difference(&near.state, &walked.state);
     assert!(apart < 1e-6, "{apart:.1e}");
