@@ -110,7 +110,7 @@ pub enum StepKind {
     Walked,
     /// The body was let go where the path turned back, or left a saddle: see [`Snap`].
     Snapped,
-    /// Contact that was eased on the path sets in over a narrower range.
+    /// Contact that was eased sets in over a narrower range.
     Hardened,
     /// It did not converge.
     Failed,
@@ -363,7 +363,8 @@ impl<'m> Solver<'m> {
         (self.balance.negative_modes() == Some(0)).then_some((state, history))
     }
 
-    /// The same with states on the way that are balanced to `on_the_way`.
+    /// The equilibrium at `to` along the path from `from`, with contact as its law says and states on the way that are balanced to
+    /// `on_the_way`.
     fn follow(
         &mut self,
         from: &State,
